@@ -12,6 +12,7 @@ import io
 import json
 import os
 import resource
+import shutil
 import subprocess
 import sys
 import warnings
@@ -29,9 +30,11 @@ os.environ.setdefault("VALIDATE_WORKERS", "1")  # of `run`: the tests themselves
 
 from collections.abc import Callable, Generator, Iterator
 from functools import cache
+from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 ROOT = Path(__file__).resolve().parents[1]
 if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is found by what they test
@@ -39,26 +42,26 @@ if (_data := ROOT.parent / "shared" / "data").is_dir():  # found by tests is fou
 
 import pytest
 from hypothesis import settings
-from matplotlib.figure import Figure
 
-from validate.compare.result import Result
-from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.find import find
-from validate.pipeline.experiment.options import Options
-from validate.pipeline.run.pipeline import compare
-from validate.recording.formats import subprocess_decoder
+if TYPE_CHECKING:  # the process that hands tests out would take a second to import what none runs
+    from validate.compare.result import Result
+    from validate.pipeline.experiment.experiment import Experiment
 
 # private: _ended, _decode: the process between them is what `decoded_here` leaves out.
 
 LONG_RUNS = ("phantom_result", "whole")
 LONG = {"phantom_result", "cheap"}  # fixtures that take tens of seconds: so do their tests
 # Groups that take minutes begin first: a short one ends each process.
-FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree")
+FIRST = (*LONG_RUNS, "test_help.py", "examples of studies", "test_site.py", "tree",
+         "test_plugins.py")  # fmt: skip
 # The same examples each time, and no test judges the time that it takes.
-settings.register_profile("validate", deadline=None, derandomize=True)
+settings.register_profile("validate", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("validate")
-BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study")  # no figure is read
-_DRAW = Figure.draw
+BLANK = ("commands", "engine", "experiments", "library", "pipeline", "study",  # no figure is read
+         "test_browser.py", "test_exhibits.py", "test_history.py", "test_long_table.py",
+         "test_page.py", "test_page_data.py", "test_paraview.py", "test_printed_figures.py",
+         "test_store.py", "test_views.py", "test_write.py")  # fmt: skip
+_NUMBERS = count()  # of folders
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -93,11 +96,45 @@ def pytest_collection() -> Generator[None, object, object]:
         gc.enable()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _machine_stays() -> Iterator[None]:
+    """Files of tests need not outlive a loss of power, and packages stay as they are installed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        patch.setattr("validate.report.stored.environment.version", cache(version))
+        yield
+
+
+@pytest.fixture
+def tmp_path(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Path]:
+    """A folder of a test's own, removed where the test passes. That of pytest looks at the folders
+    of all tests before it, and keeps all for the next run to remove."""
+    before = request.session.testsfailed
+    path = tmp_path_factory.getbasetemp() / f"{request.node.originalname[:30]}_{next(_NUMBERS)}"
+    path.mkdir()
+    yield path
+    if request.session.testsfailed == before:
+        shutil.rmtree(path, ignore_errors=True)
+
+
+@cache
+def _drawn() -> Any:
+    """How figures are drawn; asked first before they are blank."""
+    from matplotlib.figure import Figure
+
+    return Figure.draw
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _blank_figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Figures are composed, but not drawn, in folders where no test reads one."""
+    """Figures are composed, but not drawn, in folders and files where no test reads one."""
+    _drawn()
+    from matplotlib.figure import Figure
+
     with pytest.MonkeyPatch.context() as patch:
-        if request.path.parent.name in BLANK:
+        if {request.path.parent.name, request.path.name} & set(BLANK):
             patch.setattr(Figure, "draw", lambda figure, renderer: None)
             patch.setenv("VALIDATE_NO_GL", "1")
         yield
@@ -111,7 +148,8 @@ def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
     process that decodes a user's files."""
     if request.node.get_closest_marker("own_process"):
         return
-    module = subprocess_decoder
+    from validate.recording.formats import subprocess_decoder as module
+
     free = SimpleNamespace(**{**vars(resource), "setrlimit": lambda *limits: None})
 
     def ended(decoder: str, path: Path, out: Path, given: Any, least: int) -> Any:
@@ -125,9 +163,21 @@ def decoded_here(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 
 
 @pytest.fixture
+def one_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are not even composed, which is half of a small run: for tests that write reports
+    again and again."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(0.1, 0.1))
+    FigureCanvasAgg(figure).draw()
+    monkeypatch.setattr("validate.report.charts.style.painted", lambda *_, **__: figure)
+
+
+@pytest.fixture
 def drawn_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures as a user has them, for a test that reads one in such a folder."""
-    monkeypatch.setattr(Figure, "draw", _DRAW)
+    monkeypatch.setattr("matplotlib.figure.Figure.draw", _drawn())
     monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
 
 
@@ -146,22 +196,30 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(scope="session")
-def phantom(project_root: Path) -> Experiment:
+def phantom(project_root: Path) -> "Experiment":
+    from validate.pipeline.experiment.find import find
+
     return find("fluid_phantom", project_root)
 
 
 @pytest.fixture(scope="session")
-def phantom_result(phantom: Experiment) -> Result:
+def phantom_result(phantom: "Experiment") -> "Result":
     """The whole fluid phantom, all methods, as `validate run fluid_phantom` compares it."""
+    from validate.pipeline.experiment.options import Options
+    from validate.pipeline.run.pipeline import compare
+
     return compare(phantom, Options({}))
 
 
 @pytest.fixture(scope="session")
-def whole(project_root: Path) -> Callable[[str], Result]:
+def whole(project_root: Path) -> "Callable[[str], Result]":
     """A whole experiment, as `validate run` compares it: minutes, once a session."""
+    from validate.pipeline.experiment.find import find
+    from validate.pipeline.experiment.options import Options
+    from validate.pipeline.run.pipeline import compare
 
     @cache
-    def run(name: str) -> Result:
+    def run(name: str) -> "Result":
         return compare(find(name, project_root), Options({}))
 
     return run

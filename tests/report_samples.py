@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -182,7 +183,7 @@ def no_gl() -> None:
 
 def parts_of(result: Result) -> list[tuple[int, Begun | Exhibit]]:
     """The parts of its report, with their places."""
-    return list(parts(result, lambda: table(result)))
+    return list(parts(result, cache(lambda: table(result))))
 
 
 def sections_of(result: Result) -> list[Exhibit]:
@@ -193,5 +194,7 @@ def sections_of(result: Result) -> list[Exhibit]:
 
 
 def section(result: Result, anchor: str) -> Exhibit:
-    """One section of it."""
-    return next(e for e in sections_of(result) if e.anchor == anchor)
+    """One section of it; the others are not made."""
+    found = [part for _, part in parts_of(result) if part.anchor == anchor]
+    made = [part if isinstance(part, Exhibit) else part(result) for part in found]
+    return next(exhibit for exhibit in made if exhibit is not None)

@@ -87,7 +87,8 @@ def test_a_row_is_called_as_its_experiment_calls_the_method(
 @pytest.mark.parametrize(
     ("name", "method", "cells"),
     [
-        ("silicone_beam", "mujoco", "hex8"),  # each cut into six linear tetrahedra
+        # each cut into six linear tetrahedra
+        pytest.param("silicone_beam", "mujoco", "hex8", marks=pytest.mark.slow),
         pytest.param("ecoflex_cylinder", "felupe", "tet10", marks=pytest.mark.slow),
         pytest.param("ecoflex_cylinder", "calculix", "tet10", marks=pytest.mark.slow),
         pytest.param("ecoflex_cylinder", "mujoco", "tet4", marks=pytest.mark.slow),

@@ -91,6 +91,28 @@ def called(*arguments: str, site: Path, cwd: Path) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
+EACH = """
+import contextlib, io, json, sys
+from validate.commands.main import run
+def one(words):
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        with contextlib.redirect_stderr(io.StringIO()) as err:
+            code = run(words.split())
+    return code, out.getvalue(), err.getvalue()
+print(json.dumps([one(words) for words in sys.argv[1:]]))
+"""
+
+
+def each(
+    *commands: str, site: Path, cwd: Path, then: str = "pass"
+) -> tuple[list[tuple[int, str, str]], str]:
+    """Commands by one process after each other, and what a script prints there at last."""
+    done = python("-c", EACH + then, *commands, site=site, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    told, _, printed = done.stdout.partition("\n")
+    return [tuple(one) for one in json.loads(told)], printed
+
+
 def package(folder: Path, name: str, points: str, module: str = "") -> None:
     """An installed package as pip leaves it: metadata, entry points, one module."""
     info = folder / f"{name}-1.0.dist-info"
@@ -100,41 +122,12 @@ def package(folder: Path, name: str, points: str, module: str = "") -> None:
     (folder / f"{name}.py").write_text(module)
 
 
-def test_an_installed_package_is_listed_with_its_version(site: Path, tmp_path: Path) -> None:
-    code, out, err = called("list", "--plugins", "--json", site=site, cwd=tmp_path)
-    assert (code, err) == (0, "")
-    listed = [(p["kind"], p["name"], p["package"], p["version"], p["left_out"])
-              for p in json.loads(out)]  # fmt: skip
-    ours = ("validate-demonstration", VERSION, "")
-    assert listed == [
-        ("experiments", "demonstration", *ours), ("filters", "nudging", *ours),
-        ("laws", "gent", *ours), ("readers", "gauge", *ours),
-    ]  # fmt: skip
-    table = called("list", "--plugins", site=site, cwd=tmp_path)[1]
-    assert table.count(f"validate-demonstration  {VERSION}    used") == 4
-    assert "nudged_block" in called("list", site=site, cwd=tmp_path)[1]
-
-
-def test_its_format_is_read(site: Path, tmp_path: Path) -> None:
-    (tmp_path / "pull.gauge").write_text(LOG)
-    code, out, err = called("inspect", "pull.gauge", "--map", "unit=mN", site=site, cwd=tmp_path)
-    assert (code, err) == (0, "")
-    assert "read as gauge (log of a force gauge), because its first line is '# gauge'" in out
-    assert "'force' changes most, 29.0 N peak to peak" in out
-    whose = f"plug-in 'gauge' of validate-demonstration {VERSION} (validate.readers)"
-    assert f"read by: {whose}" in " ".join(out.split())
-    code, _, err = called("inspect", "pull.gauge", "--map", "unti=mN", site=site, cwd=tmp_path)
-    assert code == 2
-    assert err == "validate: --map unti=...: no such key; did you mean 'unit'? known: unit\n"
-
-
-def test_a_declaration_names_its_law_and_filter(site: Path, tmp_path: Path) -> None:
-    script = """
+DECLARED = """
 import json
 from pathlib import Path
 from validate.pipeline.experiment.declaration import classes, from_json, to_json
-from validate.pipeline.experiment.find import find
-from validate.pipeline.run.runs import plug_ins_used
+from validate.pipeline.experiment.find import find, load_file
+from validate.pipeline.run.cached_runs import plug_ins_used
 experiment = find("nudged_block", Path.cwd())
 methods = json.loads(to_json(experiment))["experiment"]["methods"]["items"]
 print(methods["nudged"]["settings"], methods["gent"]["scene"]["items"])
@@ -143,12 +136,71 @@ assert again.methods["nudged"] == experiment.methods["nudged"]
 assert {"Nudging", "GentCoefficients", "KfFem"} <= classes().keys()
 assert [len(plug_ins_used(m)) for m in experiment.methods.values()] == [0, 1, 1]
 print(*plug_ins_used({"law": "gent"}, {"law": "neo_hooke"}))
+for name in ("plates", "body"):
+    material = load_file(Path(f"experiments/{name}.py")).parameters.scene.material
+    print(type(material.coefficients).__name__, material.coefficients.J_m)
 """
-    done = python("-c", script, site=site, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "{'type': 'Nudging'}" in done.stdout
-    assert "{'type': 'GentCoefficients', 'J_m': 30.0}" in done.stdout
-    assert done.stdout.splitlines()[-1] == f"validate-demonstration {VERSION}"
+Told = tuple[list[tuple[int, str, str]], str]
+
+
+@pytest.fixture(scope="module")
+def told(site: Path, tmp_path_factory: pytest.TempPathFactory) -> Told:
+    """What the installed package changes, asked of one process."""
+    folder = tmp_path_factory.mktemp("installed")
+    (folder / "pull.gauge").write_text(LOG)
+    t = np.arange(200) / 10
+    log = [f"{a:g},{8e-2 * a:.5g},{0.056 * a:.5g}" for a in t]
+    (folder / "log.csv").write_text("\n".join(["Time (s),Position (mm),Load (N)", *log]))
+    imported = ("import", "log.csv", "--map", "test=compression", "-o", "log.mcap")
+    code, _, err = here(*imported, cwd=folder)
+    assert code == 0, err
+    kinds = {"plates": PLATES, "body": BODY}
+    for kind, answers in kinds.items():
+        text = f'law = "gent"\nmaterial.J_m = "2.5"\n{answers}'
+        (folder / f"{kind}.toml").write_text(text, "utf-8")
+    commands = (
+        "list --plugins --json", "list --plugins", "list", "inspect pull.gauge --map unit=mN",
+        "inspect pull.gauge --map unti=mN",
+        *(f"new {kind} --from log.mcap --answers {kind}.toml" for kind in kinds),
+    )  # fmt: skip
+    return each(*commands, site=site, cwd=folder, then=DECLARED)
+
+
+def test_an_installed_package_is_listed_with_its_version(told: Told) -> None:
+    (code, out, err), table, experiments = told[0][:3]
+    assert (code, err) == (0, "")
+    listed = [(p["kind"], p["name"], p["package"], p["version"], p["left_out"])
+              for p in json.loads(out)]  # fmt: skip
+    ours = ("validate-demonstration", VERSION, "")
+    assert listed == [
+        ("experiments", "demonstration", *ours), ("filters", "nudging", *ours),
+        ("laws", "gent", *ours), ("readers", "gauge", *ours),
+    ]  # fmt: skip
+    assert table[1].count(f"validate-demonstration  {VERSION}    used") == 4
+    assert "nudged_block" in experiments[1]
+
+
+def test_its_format_is_read(told: Told) -> None:
+    (code, out, err), (wrong, _, why) = told[0][3:5]
+    assert (code, err) == (0, "")
+    assert "read as gauge (log of a force gauge), because its first line is '# gauge'" in out
+    assert "'force' changes most, 29.0 N peak to peak" in out
+    whose = f"plug-in 'gauge' of validate-demonstration {VERSION} (validate.readers)"
+    assert f"read by: {whose}" in " ".join(out.split())
+    assert wrong == 2
+    assert why == "validate: --map unti=...: no such key; did you mean 'unit'? known: unit\n"
+
+
+def test_a_declaration_names_its_law_and_filter(told: Told) -> None:
+    first, second, *_ = told[1].splitlines()
+    assert "{'type': 'Nudging'}" in first
+    assert "{'type': 'GentCoefficients', 'J_m': 30.0}" in first
+    assert second == f"validate-demonstration {VERSION}"
+
+
+def test_a_new_experiment_has_its_law_with_its_coefficients(told: Told) -> None:
+    assert [code for code, _, _ in told[0][5:]] == [0, 0], told[0][5:]
+    assert told[1].splitlines()[2:] == 2 * ["GentCoefficients 2.5"]
 
 
 def test_a_law_of_a_plug_in_is_solved_or_refused_in_one_line(further_law: LawKind) -> None:
@@ -242,7 +294,8 @@ def test_a_broken_plug_in_costs_one_warning(tmp_path: Path) -> None:
     for name, (module, _) in BROKEN.items():
         package(tmp_path / "site", name, f"[validate.readers]\n{name} = {name}:READER\n", module)
     (tmp_path / "log.csv").write_text(POINTS)
-    code, out, err = called("inspect", "log.csv", site=tmp_path / "site", cwd=tmp_path)
+    commands = ("inspect log.csv", "list --plugins --json")
+    ((code, out, err), listed), _ = each(*commands, site=tmp_path / "site", cwd=tmp_path)
     assert code == 0
     assert "read as points" in out
     assert err.splitlines() == [
@@ -250,26 +303,24 @@ def test_a_broken_plug_in_costs_one_warning(tmp_path: Path) -> None:
         f"update or uninstall {name}"
         for name, (_, why) in sorted(BROKEN.items())
     ]
-    listed = called("list", "--plugins", "--json", site=tmp_path / "site", cwd=tmp_path)[1]
-    assert {p["name"]: p["left_out"] for p in json.loads(listed)} == {
+    assert {p["name"]: p["left_out"] for p in json.loads(listed[1])} == {
         name: why for name, (_, why) in BROKEN.items()
     }
 
 
-@pytest.mark.parametrize(
-    ("group", "hint"), [("reader", "did you mean validate.readers? "), ("zzz", "")]
-)
-def test_an_unknown_group_of_entry_points_costs_one_warning(
-    group: str, hint: str, tmp_path: Path
-) -> None:
-    package(tmp_path / "site", "gauge", f"[validate.{group}]\ngauge = gauge:READER\n")
+def test_an_unknown_group_of_entry_points_costs_one_warning(tmp_path: Path) -> None:
+    hints = {"reader": "did you mean validate.readers? ", "zzz": ""}
+    for group in hints:
+        points = f"[validate.{group}]\ngauge = gauge_{group}:READER\n"
+        package(tmp_path / "site", f"gauge_{group}", points)
     (tmp_path / "log.csv").write_text(POINTS)
     code, _, err = called("inspect", "log.csv", site=tmp_path / "site", cwd=tmp_path)
     assert code == 0
     assert err.splitlines() == [
-        f"validate: plug-in 'gauge' of gauge 1.0 (validate.{group}) is left out: no group "
+        f"validate: plug-in 'gauge' of gauge_{group} 1.0 (validate.{group}) is left out: no group "
         f"'validate.{group}' of entry points; {hint}known: {', '.join(KINDS)}; update or "
-        "uninstall gauge"
+        f"uninstall gauge_{group}"
+        for group, hint in hints.items()
     ]
 
 
@@ -317,32 +368,6 @@ READER = Reader("gauge", "a gauge", lambda p: p.suffix == ".gauge", read, "its e
     assert "force" in out
 
 
-@pytest.mark.parametrize("kind", ["plates", "body"])
-def test_a_new_experiment_has_its_law_with_its_coefficients(
-    site: Path, tmp_path: Path, kind: str
-) -> None:
-    t = np.arange(200) / 10
-    log = [f"{a:g},{8e-2 * a:.5g},{0.056 * a:.5g}" for a in t]
-    (tmp_path / "log.csv").write_text("\n".join(["Time (s),Position (mm),Load (N)", *log]))
-    imported = ("import", "log.csv", "--map", "test=compression", "-o", "log.mcap")
-    code, _, err = here(*imported, cwd=tmp_path)
-    assert code == 0, err
-    answers = {"plates": PLATES, "body": BODY}[kind]
-    (tmp_path / "a.toml").write_text(f'law = "gent"\nmaterial.J_m = "2.5"\n{answers}', "utf-8")
-    words = ("new", "mine", "--from", "log.mcap", "--answers", "a.toml")
-    code, _, err = called(*words, site=site, cwd=tmp_path)
-    assert code == 0, err
-    script = """
-from validate.pipeline.experiment.find import load_file
-from pathlib import Path
-mine = load_file(Path("experiments/mine.py"))
-material = mine.parameters.scene.material
-print(type(material.coefficients).__name__, material.coefficients.J_m)
-"""
-    told = python("-c", script, site=site, cwd=tmp_path)
-    assert told.stdout.split() == ["GentCoefficients", "2.5"], told.stderr
-
-
 def test_an_experiment_whose_name_is_taken_is_told_of(tmp_path: Path) -> None:
     package(tmp_path / "site", "mine", "[validate.experiments]\nlab = mine_lab.trials\n", "")
     (tmp_path / "site" / "mine_lab" / "trials").mkdir(parents=True)
@@ -358,21 +383,23 @@ def test_an_experiment_whose_name_is_taken_is_told_of(tmp_path: Path) -> None:
 def test_a_package_adds_a_view(tmp_path: Path) -> None:
     module = "from validate.report import View\nVIEW = View('late', 'Late', {}, x='method')\n"
     package(tmp_path / "site", "seen", "[validate.views]\nlate = seen:VIEW\n", module)
-    site = tmp_path / "site"
-    listed = json.loads(called("list", "--plugins", "--json", site=site, cwd=tmp_path)[1])
-    assert [(p["kind"], p["name"], p["left_out"]) for p in listed] == [("views", "late", "")]
     script = "from validate.report import VIEWS; print(VIEWS.further[0].title)"
-    assert python("-c", script, site=site, cwd=tmp_path).stdout.strip() == "Late"
+    (told,), title = each(
+        "list --plugins --json", site=tmp_path / "site", cwd=tmp_path, then=script
+    )
+    listed = json.loads(told[1])
+    assert [(p["kind"], p["name"], p["left_out"]) for p in listed] == [("views", "late", "")]
+    assert title.strip() == "Late"
 
 
 def test_help_and_a_list_of_experiments_run_no_plug_in(tmp_path: Path) -> None:
     for kind in KINDS:
         points = f"[validate.{kind}]\nx = ran_{kind}:PART\n"
         package(tmp_path / "site", f"ran_{kind}", points, "open('ran', 'w').close()")
-    assert called("--help", site=tmp_path / "site", cwd=tmp_path)[0] == 0
-    assert called("list", site=tmp_path / "site", cwd=tmp_path)[0] == 0
-    assert not (tmp_path / "ran").exists()
-    assert called("list", "--plugins", site=tmp_path / "site", cwd=tmp_path)[0] == 0
+    there = "import os; print(os.path.exists('ran')); run(['list', '--plugins'])"
+    told, printed = each("--help", "list", site=tmp_path / "site", cwd=tmp_path, then=there)
+    assert [code for code, _, _ in told] == [0, 0]
+    assert printed.startswith("False\n")
     assert (tmp_path / "ran").exists()
 
 
@@ -404,19 +431,19 @@ class Neither:
     names = ("Steps", "Solves", "Neither")
     points = "".join(f"{name} = two:{name}\n" for name in names)
     package(tmp_path / "site", "two", f"[validate.schemes]\n{points}", module)
-    code, out, err = called("list", "--plugins", "--json", site=tmp_path / "site", cwd=tmp_path)
-    assert code == 0
-    assert {p["name"]: p["left_out"] for p in json.loads(out)} == {
-        "Steps": "", "Solves": "", "Neither": "Neither has no prepare",
-    }  # fmt: skip
-    assert len(err.splitlines()) == 1
     script = """
 from validate.pipeline.experiment.declaration import classes
 from validate.solve.schemes import SCHEMES, SOLVERS
 print([s.__name__ for s in (*SCHEMES.further, *SOLVERS.further)], classes()["Solves"])
 """
-    done = python("-c", script, site=tmp_path / "site", cwd=tmp_path)
-    assert done.stdout == "['Steps', 'Solves'] <class 'two.Solves'>\n"
+    asked = "list --plugins --json"
+    ((code, out, err),), printed = each(asked, site=tmp_path / "site", cwd=tmp_path, then=script)
+    assert code == 0
+    assert {p["name"]: p["left_out"] for p in json.loads(out)} == {
+        "Steps": "", "Solves": "", "Neither": "Neither has no prepare",
+    }  # fmt: skip
+    assert len(err.splitlines()) == 1
+    assert printed == "['Steps', 'Solves'] <class 'two.Solves'>\n"
 
 
 def test_damaged_entry_points_and_absent_metadata_cost_a_line(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """The project's own code as syntax trees, each file parsed once for all tests that look at it."""
 
 import ast
+import gc
 from functools import cache
 from pathlib import Path
 
@@ -16,5 +17,8 @@ def parsed(path: Path) -> ast.Module:
 
 @cache
 def nodes(path: Path) -> tuple[ast.AST, ...]:
-    """Every node of a file, in `ast.walk`'s order."""
-    return tuple(ast.walk(parsed(path)))
+    """Every node of a file, in `ast.walk`'s order. A million of them are no garbage: looking for
+    it among them would take longer than parsing."""
+    found = tuple(ast.walk(parsed(path)))
+    gc.freeze()
+    return found

@@ -29,7 +29,7 @@ PAGES = (
 )
 TIP = np.array([0.108, 0.008, 0.003])
 SLOW = ("study", "run", "check", "identify", "show", "compare", "history", "summary", "export",
-        "report", "open", "external", "live", "data get")  # fmt: skip
+        "report", "open", "external", "live", "data get", "body")  # fmt: skip
 README = ["validate", "run", "fluid_phantom"]  # its first command, which `.ci/run` executes
 # Words after those of an example: the same command, of fewer methods and seeds, or in this process.
 FEWER = {"run": ("--methods", "fem,kf_reduced"),

@@ -1,5 +1,6 @@
 """`validate new` by questions: from markers, outlines or forces and any body to a verdict."""
 
+import json
 import multiprocessing
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -21,6 +22,8 @@ from validate.recording.mcap.write import write_recording
 from validate.recording.types import Contours, Frames, Markers, Recording, Signal, Source
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh_files.mesh_file import write_mesh
+
+pytestmark = pytest.mark.usefixtures("one_picture")
 
 E, NU, RHO, G, SIZE = 20e3, 0.3, 1100.0, 9.80665, (0.04, 0.03, 0.05)
 T = np.linspace(0.0, 4.0, 81)
@@ -45,6 +48,7 @@ def markers() -> dict[str, Markers]:
     return {"m": Markers(T, ("A", "B", "C", "D"), x + SHARE[:, None, None] * u + noise, 5e-6, "b")}
 
 
+COARSE = {"body.cells": "2,2,2"}  # what is uniform is exact on any mesh
 PRESSED = """
 experiment = "body"
 law = "linear"
@@ -82,6 +86,7 @@ def test_a_body_of_hexahedra_is_solved_as_its_methods_say(here: Path) -> None:
     assert {s.name: s.value for s in method.scores}["force.rms@high"] < 0.03  # of 0.48 N: exact
 
 
+@pytest.mark.usefixtures("decoded_here")
 def test_a_body_of_an_unusual_size_is_a_question(here: Path) -> None:
     """Read in mm, a file in metres is a twentieth of a millimetre high."""
     nodes = grid(SIZE, (2, 2, 2))
@@ -115,7 +120,7 @@ def test_answers_make_an_experiment_that_runs(here: Path) -> None:
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert len(text.splitlines()) <= 60
     assert "material=Material(E=20000, nu=0.3, rho=1000),  # E: Pa, rho: kg/m^3" in text
-    result = run_in_memory(load_file(here / "experiments" / "mine.py"))
+    result = run_in_memory(load_file(here / "experiments" / "mine.py"), COARSE)
     assert {c.name: c.verdict for c in result.checks} == dict.fromkeys(
         ("force.max@low", "force.max@high", "marker.max@low", "marker.max@high"), "good enough"
     )
@@ -126,7 +131,7 @@ def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
     assert called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")[0] == 0
     file = here / "experiments" / "mine.py"
     mine = load_file(file)
-    coarse = {"methods.linear.body.cells": "2,2,2"}
+    coarse = {f"methods.linear.{path}": cells for path, cells in COARSE.items()}
     assert run_name(mine, Options(coarse)) != run_name(mine, Options({}))
     found = run_in_memory(mine, coarse, quick=True)
     assert [(c.path, c.value) for c in found.changed] == [("methods.linear.body.cells", [2, 2, 2])]
@@ -148,28 +153,42 @@ def test_what_a_user_sets_or_mistypes_of_a_method_is_seen(here: Path) -> None:
 
 def _worked(job: Job) -> dict[str, float]:
     """On a worker: the scores of the job's experiment."""
-    (method,) = run_in_memory(job.experiment(), methods=("linear",), quick=True).methods
+    experiment = job.experiment()
+    (method,) = run_in_memory(experiment, COARSE, methods=("linear",), quick=True).methods
     return {s.name: s.value for s in method.scores if s.unit in ("N", "m")}
 
 
-def test_a_declaration_runs_as_json_here_and_on_a_worker(here: Path) -> None:
-    """Nothing of the experiment's file is needed then."""
+@pytest.fixture
+def job(here: Path) -> Job:
     called("new", "mine", "--from", "all.mcap", "--answers", "a.toml")
+    return job_of(load_file(here / "experiments" / "mine.py"))
+
+
+def test_a_declaration_runs_as_json(here: Path, job: Job) -> None:
+    """Nothing of the experiment's file is needed then."""
     file = here / "experiments" / "mine.py"
-    written = load_file(file)
     text = called("list", str(file), "--declaration")[1]
     file.with_suffix(".json").write_text(text, "utf-8")
-    job = job_of(written)
     assert job.declaration == text.strip()
     ours = _worked(job)
-    file.unlink()
     assert len(ours) > 3
+    file.unlink()
+    told = ("--methods", "linear", "--quick", "--out", str(here / "reports"))
+    cells = (text for path, value in COARSE.items() for text in ("--set", f"{path}={value}"))
+    code, shown = called("run", str(file.with_suffix(".json")), *told, *cells)
+    assert code in (0, 1), shown  # quick: what it finds is tested elsewhere
+    (stored,) = (here / "reports").glob("mine+*/results.json")
+    (method,) = json.loads(stored.read_text("utf-8"))["methods"]
+    found = {s["name"]: s["value"] for s in method["scores"]}
+    assert {name: found[name] for name in ours} == pytest.approx(ours, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_declaration_runs_on_a_worker(here: Path, job: Job) -> None:
+    ours = _worked(job)
+    (here / "experiments" / "mine.py").unlink()
     with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as workers:
         assert workers.submit(_worked, job).result() == pytest.approx(ours, rel=1e-12)
-    told = ("--methods", "linear", "--quick", "--out", str(here / "reports"))
-    code, shown = called("run", str(file.with_suffix(".json")), *told)
-    assert code in (0, 1), shown  # quick: what it finds is tested elsewhere
-    assert list((here / "reports").glob("mine+*/results.json")), shown
 
 
 def test_what_is_open_is_asked_all_at_once(here: Path) -> None:
@@ -277,7 +296,7 @@ def test_markers_alone_and_a_mesh_of_ones_own(here: Path) -> None:
     assert code == 0, said
     text = (here / "experiments" / "mine.py").read_text("utf-8")
     assert "body=MeshFile(file='../body.npz', element='quadratic')," in text
-    result = run_in_memory(load_file(here / "experiments" / "mine.py"))
+    result = run_in_memory(load_file(here / "experiments" / "mine.py"), quick=True)
     assert [c.name for c in result.checks] == ["marker.max@low", "marker.max@high"]
     (here / "answers").mkdir()
     for name in ("../body.npz", str(here / "body.npz"), "link.npz"):

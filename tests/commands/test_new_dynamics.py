@@ -3,15 +3,17 @@
 The recordings are those of `benchmarks/moving_bodies.py`.
 """
 
-from collections.abc import Iterator
-from dataclasses import replace
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from benchmarks.moving_bodies import written
+from benchmarks import moving_bodies
 from validate.commands.check import described
 from validate.commands.main import cli
 from validate.commands.questions import motion
@@ -52,17 +54,18 @@ def called(*arguments: str) -> tuple[int, str]:
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("moving")
-    for name in ("swinging", "pushed", "filmed", "chamber"):
-        written(name, folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(moving_bodies, "bricks", cache(moving_bodies.bricks))
+        for name in moving_bodies.NAMES:
+            moving_bodies.written(name, folder)
     return folder
 
 
 @pytest.fixture
-def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    for file in made.iterdir():
-        (tmp_path / file.name).write_bytes(file.read_bytes())
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+def here(made: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One folder for all: each test writes its answers and its experiment anew."""
+    monkeypatch.chdir(made)
+    return made
 
 
 def new(here: Path, name: str, *changes: tuple[str, str]) -> tuple[int, str]:
@@ -84,6 +87,31 @@ def run(of: Experiment, method: str) -> MethodRun:
     return solve(of, recordings, method, of.methods[method], of.parameters)
 
 
+@dataclass(frozen=True, eq=False)
+class Unchanged:
+    """The experiment of the benchmark's own answers, and its runs by method."""
+
+    mine: Experiment
+    lines: int
+    run: Callable[[str], MethodRun]
+
+
+@pytest.fixture(scope="module")
+def unchanged(made: Path) -> Callable[[str], Unchanged]:
+    """Made once, for tests that change no answer."""
+
+    @cache
+    def of(name: str) -> Unchanged:
+        with contextlib.chdir(made):
+            code, said = new(made, name)
+            assert code == 0, said
+            lines = len((made / "experiments" / "mine.py").read_text("utf-8").splitlines())
+            mine = experiment(made)
+        return Unchanged(mine, lines, cache(partial(run, mine)))
+
+    return of
+
+
 def off(followed: MethodRun) -> float:
     """Rms m of the markers' residuals, per axis."""
     values = [r.values for r in followed.residuals.values()]
@@ -96,18 +124,17 @@ STATIC = ('how = "dynamic", damping = "0.003s"', 'how = "static"')
 @pytest.mark.parametrize(("name", "within", "still"), [("swinging", 1e-4, 5e-4),
                                                        ("pushed", 1e-4, 5e-4)])  # fmt: skip
 def test_answers_make_a_motion_that_is_another_codes(
-    here: Path, name: str, within: float, still: float
+    unchanged: Callable[[str], Unchanged], name: str, within: float, still: float
 ) -> None:
     """Within a tenth of what statics is off by; the file is short and has the methods."""
-    code, said = new(here, name)
-    assert code == 0, said
-    assert len((here / "experiments" / "mine.py").read_text("utf-8").splitlines()) <= 60
-    mine = experiment(here)
-    assert set(mine.methods) >= {"implicit", "modal", "explicit", "static", "reduced_kf", "roukf"}
-    assert off(run(mine, "implicit")) < within
-    assert off(run(mine, "modal")) < within
-    assert off(run(mine, "static")) > still
-    filtered = run(mine, "reduced_kf")
+    made = unchanged(name)
+    assert made.lines <= 60
+    names = {"implicit", "modal", "explicit", "static", "reduced_kf", "roukf"}
+    assert set(made.mine.methods) >= names
+    assert off(made.run("implicit")) < within
+    assert off(made.run("modal")) < within
+    assert off(made.run("static")) > still
+    filtered = made.run("reduced_kf")
     assert filtered.run.finished
     assert off(filtered) < within
 
@@ -122,30 +149,30 @@ def test_a_pressure_over_time_moves_the_wall_of_a_chamber(here: Path) -> None:
     assert "loads=(Pressure(name='pressure', facets='inner'),)," in text
 
 
-def test_a_film_of_a_motion_is_compared_and_given_to_filters(here: Path) -> None:
+def test_a_film_of_a_motion_is_compared_and_given_to_filters(
+    unchanged: Callable[[str], Unchanged],
+) -> None:
     """Outlines at 20 Hz with 40 um of noise, one marker: the outline is within its noise, and the
     marker, which no filter is given, is where a filter of the outline says; statics is off."""
-    code, said = new(here, "filmed")
-    assert code == 0, said
-    assert len((here / "experiments" / "mine.py").read_text("utf-8").splitlines()) <= 60
-    mine = experiment(here)
-    assert mine.methods["reduced_kf"].markers == ("outline",)
-    found = run(mine, "implicit").residuals
+    made = unchanged("filmed")
+    assert made.lines <= 60
+    assert made.mine.methods["reduced_kf"].markers == ("outline",)
+    found = made.run("implicit").residuals
     assert set(found) >= {"contour@film", "side@all"}
     assert np.sqrt(np.mean(found["contour@film"].values ** 2)) < 6e-5
-    assert np.sqrt(np.mean(run(mine, "static").residuals["contour@film"].values ** 2)) > 5e-4
-    filtered = run(mine, "reduced_kf")
+    assert np.sqrt(np.mean(made.run("static").residuals["contour@film"].values ** 2)) > 5e-4
+    filtered = made.run("reduced_kf")
     assert filtered.run.finished
     assert {"innovation.outline.0", "innovation.outline.23"} <= set(filtered.run.traces)
     assert np.sqrt(np.mean(filtered.residuals["side@all"].values ** 2)) < 1e-4
 
 
-def test_filters_of_an_outline_are_ranked_at_the_marker(here: Path) -> None:
+def test_filters_of_an_outline_are_ranked_at_the_marker(
+    unchanged: Callable[[str], Unchanged], tmp_path: Path
+) -> None:
     """Beside plain FEM and the outline's last places held."""
-    new(here, "filmed")
-    found = study(
-        experiment(here), methods=("reduced_kf", "modal"), out=here, where=Where(workers=0)
-    )
+    mine = unchanged("filmed").mine
+    found = study(mine, methods=("reduced_kf", "modal"), out=tmp_path, where=Where(workers=0))
     (ranking,) = found.rankings
     names = [r.cell.name for r in ranking.rows]
     assert names == ["reduced_kf", "modal", "last measurement, held"]
@@ -153,14 +180,15 @@ def test_filters_of_an_outline_are_ranked_at_the_marker(here: Path) -> None:
     assert not ranking.failed
 
 
-def test_of_three_markers_filters_are_given_two_and_each_is_held_out(here: Path) -> None:
+@pytest.mark.slow
+def test_of_three_markers_filters_are_given_two_and_each_is_held_out(
+    unchanged: Callable[[str], Unchanged], tmp_path: Path
+) -> None:
     """The tip moves most and is predicted; the filter beats the last measurement held."""
-    code, said = new(here, "swinging")
-    assert code == 0, said
-    mine = experiment(here)
+    mine = unchanged("swinging").mine
     assert mine.methods["reduced_kf"].markers == ("side", "middle")
     found = study(
-        mine, methods=("reduced_kf", "modal"), hold_out=("each",), out=here,
+        mine, methods=("reduced_kf", "modal"), hold_out=("each",), out=tmp_path,
         where=Where(workers=0),
     )  # fmt: skip
     (ranking,) = found.rankings
@@ -181,6 +209,7 @@ def test_an_answer_names_the_markers_that_filters_are_given(here: Path) -> None:
     assert (code, "no marker end; there are tip, middle, side" in said) == (2, True), said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "names"), [
     ("linear", "implicit,ensemble_kf,filterpy,modal"),
     ("neo_hooke", "large,static,modal"),
@@ -215,6 +244,7 @@ def test_filters_of_a_mesh_file_run(here: Path, law: str, names: str, damping: s
     )  # fmt: skip
     assert code == 0, said
     mine = experiment(here)
+    assert set(mine.methods) == set(names.split(","))
     short = replace(mine, parameters=with_given(mine.parameters, {"motion.length": 0.05}))
     for name in names.split(","):
         assert run(short, name).run.finished, name
@@ -229,12 +259,13 @@ def test_a_method_that_does_not_fit_is_refused(here: Path) -> None:
         assert (code, why in said) == (2, True), said
 
 
-def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(here: Path) -> None:
-    new(here, "swinging")
-    mine = experiment(here)
+def test_the_release_starts_the_clock_and_the_axis_is_that_of_the_swing(
+    unchanged: Callable[[str], Unchanged],
+) -> None:
+    mine = unchanged("swinging").mine
     recordings = mine.load(mine.parameters, folder_of(mine))
     assert mine.follows(mine, recordings, mine.parameters).axis == "z"
-    followed = run(mine, "modal")
+    followed = unchanged("swinging").run("modal")
     markers = followed.seen.of(MarkerObservation)[0]
     assert len(markers.t) == 350  # samples after 0.25 s of 2 s, at 200 Hz
     assert markers.sd_t == pytest.approx(0.005 / np.sqrt(12))
@@ -272,10 +303,11 @@ def test_answers_on_damping_and_release_are_parameters() -> None:
         held("5")
 
 
-def test_a_release_from_a_displacement_is_one_from_its_force(here: Path) -> None:
+def test_a_release_from_a_displacement_is_one_from_its_force(
+    here: Path, unchanged: Callable[[str], Unchanged]
+) -> None:
     """The end of the beam hangs by 3.87 mm under the 15 mN of the benchmark's coarser mesh."""
-    new(here, "swinging")
-    by_force = run(experiment(here), "modal")
+    by_force = unchanged("swinging").run("modal")
     sag = -by_force.seen.inputs[0, 0]
     assert sag == pytest.approx(0.015)
     new(here, "swinging", ('held = "0.015N"', 'held = "3.87mm"'))
@@ -399,15 +431,16 @@ def test_statics_of_a_film_alone_names_inertia_first(here: Path) -> None:
     assert {row[1] for row in causes.rows} == {"outline"}
 
 
-def test_a_report_has_one_largest_motion_and_says_where_it_rests(here: Path) -> None:
+def test_a_report_has_one_largest_motion_and_says_where_it_rests(
+    unchanged: Callable[[str], Unchanged],
+) -> None:
     """Note and exhibit are of the whole recording, which begins at rest and ends in motion."""
-    new(here, "pushed")
-    mine = experiment(here)
+    mine = unchanged("pushed").mine
     recordings = mine.load(mine.parameters, folder_of(mine))
     assert mine.identify is not None
     (note,) = mine.identify(recordings, mine.parameters, mine.methods).notes
     followed = mine.follows(mine, recordings, mine.parameters)
-    cases = {MAIN: {"modal": run(mine, "modal")}}
+    cases = {MAIN: {"modal": unchanged("pushed").run("modal")}}
     (shown,) = followed.exhibits(mine.parameters, cases, lambda *_: None).exhibits
     facts = {row[0]: row for row in shown.tables[0].rows}
     largest = facts["largest motion, peak to peak"][1]

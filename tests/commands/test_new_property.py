@@ -289,7 +289,7 @@ COMMON: dict[str, Any] = {
 }  # fmt: skip
 
 
-@settings(max_examples=3, **COMMON)
+@settings(max_examples=1, **COMMON)
 @given(case=CASES)
 @example(case=Case())
 @example(case=Case("gravity", "bricks.npz", held=""))  # not held: roots of rounding errors

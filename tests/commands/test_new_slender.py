@@ -78,6 +78,7 @@ def errors(of: Experiment, cells: tuple[int, ...]) -> Floats:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("estimates")
 @pytest.mark.parametrize("shape", [BLOCK, ROUND], ids=["block", "cylinder"])
 @pytest.mark.parametrize("tracked", [False, True], ids=["gravity", "tracked"])
 def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
@@ -95,6 +96,8 @@ def test_a_slender_body_is_within_a_percent_of_the_converged_one_and_says_so(
         assert 2 * check.u_val < 0.1 * motion, check
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("estimates")
 def test_refine_sets_all_load_steps_and_no_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -83,7 +83,13 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
     assert len(set(contours.each[:, 0])) == 3  # each image's own
     assert found.record("found/outline")["rivals"] == "none"
     assert moving.with_name("a-outline.png").stat().st_size > 20_000
-    assert here("outline", str(moving))[0] == 0  # again: its own stream is made anew
+
+
+@pytest.mark.slow
+def test_an_outline_that_was_found_before_is_made_anew(moving: Path) -> None:
+    for _ in range(2):
+        assert here("outline", str(moving))[0] == 0
+    assert set(read_recording(moving).streams) == {"images", "outline"}
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from validate.compare.verdict import (
 )
 from validate.errors import ComparisonError
 
-REPEATS = 1500  # the share of 4.6 % of them has a standard deviation of 0.54 %
+REPEATS = 1000  # the share of 4.6 % of them has a standard deviation of 0.66 %
 
 
 def scalar(value: float, sd: float = 1.0, systematic: float = 0.0) -> Residual:
@@ -172,7 +172,7 @@ def test_a_point_with_a_larger_uncertainty_may_be_the_worst() -> None:
     assert check.acceptance == "undecided"
 
 
-@pytest.mark.parametrize(("k", "c"), [(1, 1), (1, 2), (3, 1), (40, 1), (42, 2), (3, 3)])
+@pytest.mark.parametrize(("k", "c"), [(1, 1), (3, 1), (42, 2), (3, 3)])
 @pytest.mark.parametrize("statistic", ["every", "rms", "mean"])
 def test_perfect_model_differs_in_5_of_100_repetitions(
     k: int, c: int, statistic: Statistic
@@ -185,7 +185,7 @@ def test_perfect_model_differs_in_5_of_100_repetitions(
     assert found == pytest.approx(ALPHA, abs=0.015)
 
 
-@pytest.mark.parametrize(("k", "c"), [(1, 1), (3, 1), (40, 1), (12, 2)])
+@pytest.mark.parametrize(("k", "c"), [(1, 1), (40, 1), (12, 2)])
 @pytest.mark.parametrize("statistic", ["every", "rms", "mean"])
 def test_a_model_wrong_by_its_limit_is_rarely_called_either(
     k: int, c: int, statistic: Statistic
@@ -267,7 +267,7 @@ def test_bias_of_three_u_is_found(k: int, c: int) -> None:
 
 def test_noisy_bias_is_found_as_often_as_the_normal_law_says() -> None:
     """|3 + z| > 2 for 84.1 % of normal z; 1.5 u is missed in 69.1 %."""
-    z = np.random.default_rng(3).normal(size=4000)
+    z = np.random.default_rng(3).normal(size=2000)
     for bias, share in ((3.0, 0.8413), (1.5, 0.3087)):
         found = np.mean([judged(scalar(bias + zi)).validation == "differs" for zi in z])
         assert found == pytest.approx(share, abs=0.02)

@@ -58,7 +58,7 @@ INTS = arrays(
 
 
 @given(FLOATS, INTS, FLOATS, st.none() | st.floats())
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 def test_a_value_comes_back_bit_by_bit(
     tmp_path: Path, field: Floats, at: Ints, other: Floats, limit: float | None
 ) -> None:

@@ -235,6 +235,7 @@ def test_taylor_hood_elements_are_exact_in_uniaxial_stress(size: tuple[float, ..
     assert mixed_static(scene).compliances[0] == pytest.approx(expected, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_taylor_hood_elements_agree_within_the_mesh() -> None:
     """A bonded block under a pull: continuous pressures on the same cells. The bond's edges are
     singular: both still move by more with the mesh than they differ."""

@@ -19,11 +19,11 @@ def reports(pulled: Path) -> Path:
     return pulled.parents[1] / "reports"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # after the figures of the module are blank
 def ran(pulled: Path, reports: Path) -> RunResult:
     return validate.run(str(pulled), quick=True, out=str(reports))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def softer(pulled: Path, reports: Path) -> RunResult:
     return validate.run(pulled, {"material.E": 8000.0}, quick=True, out=reports)

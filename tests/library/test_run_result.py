@@ -25,8 +25,11 @@ from validate.pipeline import run_in_memory
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Markers, Recording, Signal, Source
+from validate.report import VIEWS
 from validate.report.stored.store import document
 from validate.study.stored_runs.overview import write_overview
+
+# private: _added: plug-ins of the test are taken out again.
 
 pytestmark = pytest.mark.xdist_group("library")
 
@@ -260,17 +263,14 @@ def test_a_run_without_an_accepted_method_warns_before_it_solves(
     assert "add one of kf" in caplog.text
 
 
-def test_a_view_of_others_that_cannot_be_filled_costs_a_warning(ran: RunResult) -> None:
-    code = (
-        "import sys, validate; from validate.report import VIEWS, View\n"
-        "VIEWS.add(View('mine', 'Mine', {'part': 'score'}, form='points', x='condition',"
-        " by='label'))\n"
-        "print(*validate.open_run(sys.argv[1]).plot)"
-    )
-    command = [sys.executable, "-c", code, str(ran.folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == list(ran.plot)
-    assert "'mine' (views) is not asked further" in done.stderr
+def test_a_view_of_others_that_cannot_be_filled_costs_a_warning(
+    ran: RunResult, request: pytest.FixtureRequest, caplog: pytest.LogCaptureFixture
+) -> None:
+    before = list(ran.plot)
+    request.addfinalizer(VIEWS._added.clear)
+    VIEWS.add(View("mine", "Mine", {"part": "score"}, form="points", x="condition", by="label"))
+    assert list(validate.open_run(ran.folder).plot) == before
+    assert "'mine' (views) is not asked further" in caplog.text
 
 
 def test_streams_below_another_stream_have_nodes_of_their_own() -> None:

@@ -67,6 +67,7 @@ def test_the_range_of_an_identified_parameter_gives_way_to_its_covariance() -> N
     assert [i.name for i in found.inputs] == ["Poisson ratio", "identified material.E"]
 
 
+@pytest.mark.slow
 def test_of_several_parameters_the_noise_and_the_correlation_are_told() -> None:
     both = Calibration("fem", (E, NU), (Calibrates(("force", "node_B")),))
     several = replace(DOUBTED, calibrations=(both,), accept=())

@@ -245,7 +245,9 @@ EXPERIMENT = replace(OPEN, name="opened")
 """
 
 
-@pytest.mark.parametrize("command", ["check", "study coverage"])
+@pytest.mark.parametrize(
+    "command", ["check", pytest.param("study coverage", marks=pytest.mark.slow)]
+)
 def test_other_commands_identify_by_the_same_cells(command: str, tmp_path: Path) -> None:
     """`check` where cells of a run are stored, and a coverage study."""
     (tmp_path / "opened.py").write_text(AS_FILE, "utf-8")

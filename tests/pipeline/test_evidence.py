@@ -40,7 +40,7 @@ HERE = Pool(Where(0))
 def other_model(**more: Any) -> Experiment:
     """The block and its twin, declared as made by another model; the twin is a file."""
     twin = replace(TINY.twin or Twin(record), kind="twin", remake=("twin.", "sd"))
-    uncertainty = Uncertainty(vary("body.cells", "x 2 3"))
+    uncertainty = Uncertainty(vary("body.cells", "x 2"))
     own = replace(TINY, twin=twin, uncertainty=uncertainty, methods=FEM, cases=(), load=shipped)
     return replace(own, **more)
 
@@ -79,8 +79,13 @@ def test_a_same_model_that_differs_has_failed() -> None:
     assert not result.passed
 
 
-def test_another_models_twin_is_evidence_but_no_measurement() -> None:
-    result = judged(other_model())
+@pytest.fixture(scope="module")
+def other() -> Result:
+    return judged(other_model())
+
+
+def test_another_models_twin_is_evidence_but_no_measurement(other: Result) -> None:
+    result = other
     assert [c.verdict for c in result.checks] == ["good enough"]
     assert result.kind == "twin"
     assert "predicts what was measured" not in result.sentence
@@ -195,9 +200,9 @@ def test_the_terminals_first_line_says_what_was_judged(
     ("doubts", "word"), [((), "good enough;"), (("50 m?",), "good enough, with warnings;")]
 )
 def test_the_first_line_doubts_what_the_warnings_doubt(
-    doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]
+    other: Result, doubts: tuple[str, ...], word: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    show_run(replace(judged(other_model()), warnings=doubts), "tiny", Path("report.html"), 1.0)
+    show_run(replace(other, warnings=doubts), "tiny", Path("report.html"), 1.0)
     assert capsys.readouterr().out.startswith(f"tiny: {word} 1 of 1 requirements are met; ")
 
 

@@ -66,8 +66,10 @@ SIZE = (0.03, 0.03, 0.03)
 
 @pytest.mark.parametrize(
     ("mesh", "order", "levels"),
-    [(box(SIZE, (5, 5, 5)), 2, 1), (box(SIZE, (9, 9, 9)), 1, 1)],
-    ids=["few tetrahedra", "many tetrahedra"],
+    [
+        pytest.param(box(SIZE, (5, 5, 5)), 2, 1, id="few tetrahedra"),
+        pytest.param(box(SIZE, (9, 9, 9)), 1, 1, id="many tetrahedra", marks=pytest.mark.slow),
+    ],
 )
 def test_a_mesh_file_is_refined_as_far_as_a_first_answer_allows(
     tmp_path: Path, mesh: Mesh, order: int, levels: int

@@ -90,7 +90,7 @@ def log() -> dict[str, Signal]:
 
 BASE = Tree(
     "body.mcap",
-    Scene(Box(SIZE, (4, 4, 4), "hex8"), Material(E, NU, rho=RHO), ROLLERS,
+    Scene(Box(SIZE, (2, 2, 2), "hex8"), Material(E, NU, rho=RHO), ROLLERS,
           drives=(Drive("displacement", "zmax", "-z"),), dilatation="by_element"),
     MeasuredBody(SeenOf(force="force", states=8, still=0.4)),
 )  # fmt: skip

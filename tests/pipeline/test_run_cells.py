@@ -34,6 +34,9 @@ NAMES = sorted(experiment_files(shipped().parent))
 STORED = re.compile(r"(\d+) of (\d+) computations were stored")
 
 
+pytestmark = pytest.mark.usefixtures("one_picture")
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_parameters_of_every_run_reach_a_worker_as_they_are(name: str) -> None:
     declared = experiment(name)
@@ -95,11 +98,9 @@ def test_what_changed_is_computed_and_nothing_else(tmp_path: Path) -> None:
     assert prepared(tmp_path) == 1
     assert not STORED.search(asked(tmp_path, path, "--set", "twin.seed=9"))  # another recording
     assert prepared(tmp_path) == 2
-    assert not STORED.search(asked(tmp_path, path, "--set", "material.E=11kPa"))
-    assert prepared(tmp_path) == 3
     path.write_text(path.read_text("utf-8") + "\n# other code\n", "utf-8")
     assert not STORED.search(asked(tmp_path, path))
-    assert prepared(tmp_path) == 4
+    assert prepared(tmp_path) == 3
 
 
 COMPARES = """

@@ -254,7 +254,7 @@ def _from(t: np.ndarray, start: float) -> np.ndarray:
 
 
 @settings(
-    max_examples=60,
+    max_examples=30,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -33,8 +33,9 @@ def test_beside_a_recording(reader: Reader, folder: Path, tmp_path: Path) -> Non
         shutil.copytree(path, folder / path.name)
     for file in files_of(path) if not path.is_dir() else ():
         shutil.copy(file, folder / file.name)
-    here("inspect", path.name, cwd=folder)
     here("import", path.name, "-o", "out.mcap", cwd=folder)
+    if reader.name == "c3d":  # a look decodes by the same processes
+        here("inspect", path.name, cwd=folder)
     assert ran(folder) == ""
 
 
@@ -63,7 +64,7 @@ def test_beside_the_workers_of_a_study(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "log").mkdir()
     plan = Plan(Job(str(tmp_path / "log"), ""), cells, open_folder, variables, Waited)
     before = dict(os.environ)
-    done = finish(plan, tmp_path / "log" / "cells", Where(workers=2))
+    done = finish(plan, tmp_path / "log" / "cells", Where(workers=1))
     assert [r.why for r in done.records.values()] == [""] * 4
     assert {row.pid for row in logged(tmp_path / "log")}.isdisjoint({os.getpid()})
     assert (tmp_path / "log" / "seen").read_text().splitlines() == [f"{folder} ''"] * 4

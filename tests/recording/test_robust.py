@@ -51,7 +51,7 @@ def under_attack(reader: Reader, folder: Path, cuts: int, flips: int) -> None:
 
 @IN_PROCESS
 def test_some_cuts_and_flips_are_a_recording_or_one_line(reader: Reader, tmp_path: Path) -> None:
-    under_attack(reader, tmp_path, cuts=20, flips=40)
+    under_attack(reader, tmp_path, cuts=10, flips=20)
 
 
 @pytest.mark.slow

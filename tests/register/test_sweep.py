@@ -97,7 +97,7 @@ def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
 def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
     surface = surface_of(stack, 1)
     block = Block(0.060, 0.045, 0.070)
-    mesh = block_with_inclusion(block, (15, 15, 19), surface)
+    mesh = block_with_inclusion(block, (9, 9, 12), surface)
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(surface.distance(wall)).max() < 1e-12
     assert cell_volumes(mesh).min() > 0

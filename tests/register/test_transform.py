@@ -44,7 +44,6 @@ def test_the_inverse_leads_back(seed, d, s):
     np.testing.assert_allclose(a.inverse().apply(a.apply(x)), x, atol=1e-12)
 
 
-@settings(max_examples=100)
 @given(seed=SEEDS, d=DIMENSIONS, k=st.integers(5, 50))
 def test_rigid_fit_recovers_the_transform_exactly(seed, d, k):
     truth = Similarity(rotation(seed, d), points(seed + 1, 1, d)[0])
@@ -54,7 +53,6 @@ def test_rigid_fit_recovers_the_transform_exactly(seed, d, k):
     assert found.s == 1.0
 
 
-@settings(max_examples=100)
 @given(seed=SEEDS, d=DIMENSIONS, s=st.floats(0.1, 10))
 def test_similarity_fit_recovers_scale_too(seed, d, s):
     truth = Similarity(rotation(seed, d), points(seed + 1, 1, d)[0], s)

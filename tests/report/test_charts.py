@@ -57,7 +57,7 @@ def of_methods(result: Result, **more: object) -> Chart:
                  **more)  # fmt: skip
 
 
-@pytest.mark.parametrize("number", [0, 1, 2])
+@pytest.mark.parametrize("number", [0, pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_chart_keeps_the_contract(result: Result, number: int) -> None:
     assert faults(drawn(result, shown()[0].charts[number])) == []
 

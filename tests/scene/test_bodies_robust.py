@@ -91,7 +91,7 @@ def under_attack(path: Path, cuts: int, flips: int) -> None:
 @pytest.mark.parametrize("name", [n for n in MAKE if n not in APART])
 def test_some_cuts_and_flips_are_a_body_or_one_line(name: str, tmp_path: Path) -> None:
     MAKE[name](tmp_path / name)
-    under_attack(tmp_path / name, cuts=20, flips=60)
+    under_attack(tmp_path / name, cuts=10, flips=30)
 
 
 @pytest.mark.slow

@@ -121,6 +121,7 @@ def test_a_new_scheme_enters_by_its_name_in_the_list(toy: None) -> None:
     assert isinstance(next(s for s in trial.solvers if s.name == "a toy").make(0.01), Toy)
 
 
+@pytest.mark.slow
 def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -177,7 +177,7 @@ def test_a_nested_choice_tells_what_the_winner_of_many_is_worth() -> None:
     """Twenty settings that are all alike: the winner looks better than it is, the nested one does
     not."""
     rng, looks, worth = np.random.default_rng(7), [], []
-    for _ in range(60):
+    for _ in range(30):
         filters = {f"kf {i}": result(rng.chisquare(3, (2, 100))) for i in range(20)}
         looks.append(min(v.scores[WITHHELD][0] for v in filters.values()))
         own = nested(filters, {}, WITHHELD, cut(100, 0.1, 0.5, "kf"))
