@@ -1,4 +1,4 @@
 """Tracked tools: calibration of a tip or an image plane, landmarks touched with a tip.
 
-Start with `pivot`.
+Start with `image_plane`.
 """
