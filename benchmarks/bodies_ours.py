@@ -10,7 +10,7 @@ from bodies_drawn import Drawn, E
 from validate.arrays import rms
 from validate.commands.questions.scene import geometry_of
 from validate.compare.convergence import GridConvergence
-from validate.pipeline.bodies.body_dynamics import MeasuredBody, SeenOf
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import measured_body, solid
 from validate.pipeline.checks.checks import Refined
 from validate.pipeline.experiment.experiment import Experiment, Variant

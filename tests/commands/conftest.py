@@ -11,7 +11,7 @@ from validate.arrays import Floats
 from validate.commands.questions import motion, new
 from validate.fem import critical as modes
 from validate.fem.critical import lowest
-from validate.pipeline.bodies.body_dynamics import COUNT, first_frequencies
+from validate.pipeline.bodies.first_modes import COUNT, first_frequencies
 from validate.pipeline.bodies.own_body import with_law
 from validate.pipeline.run.estimate import estimated
 from validate.scene.scene import Scene

@@ -23,7 +23,7 @@ from validate.engine.cell import Where
 from validate.errors import RegistrationError, UsageError
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.body_dynamics import BodyRanges, MeasuredBody
+from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.options import folder_of

@@ -150,6 +150,7 @@ def test_a_mesh_file_that_changed_is_read_again(
         assert np.ptp(mesh.nodes[:, 0]) == pytest.approx(side)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("estimates")
 def test_a_large_mesh_file_between_plates_is_filled_anew_coarser_and_refine_takes_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -21,7 +21,7 @@ from validate.commands.questions.answers import Question
 from validate.commands.questions.new import _asked, fitting
 from validate.errors import ValidateError
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.body_dynamics import MeasuredBody
+from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.experiment.declaration import from_json, to_json
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import load_file

@@ -40,6 +40,7 @@ def test_there_is_no_number_beyond_the_meshes() -> None:
     assert cells_at((rate(10, 100.0),), "x", 50.0) is None
 
 
+@pytest.mark.slow
 def test_every_integrator_is_measured_on_the_meshes_it_may_be() -> None:
     """Steps are 0.9 of the critical one where none is given; cells outside a range are left out."""
     integrators = (

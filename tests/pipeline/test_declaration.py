@@ -14,7 +14,7 @@ from validate.compare.verdict import Accept
 from validate.errors import UsageError
 from validate.estimate.filterpy.filters import FilterpyFilter
 from validate.parameters import describe
-from validate.pipeline.bodies.body_dynamics import MeasuredBody
+from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.bodies.measured import solid
 from validate.pipeline.experiment.declaration import from_json, to_json
 from validate.pipeline.experiment.experiment import Experiment

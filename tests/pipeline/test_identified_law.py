@@ -17,7 +17,7 @@ from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.compare.verdict import Accept
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.body_dynamics import MeasuredBody, SeenOf
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import solid
 from validate.pipeline.calibration.fitted_moduli import Moves, sentence
 from validate.pipeline.experiment.experiment import Experiment

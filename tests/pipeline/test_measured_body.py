@@ -33,7 +33,7 @@ from validate.pipeline.bodies import (
 from validate.pipeline.bodies import (
     markers as measured_outline,
 )
-from validate.pipeline.bodies.body_dynamics import BodyRanges, MeasuredBody, SeenOf
+from validate.pipeline.bodies.choices import BodyRanges, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import solid
 from validate.pipeline.bodies.mesh import mesh_of
 from validate.pipeline.experiment.experiment import Experiment

@@ -14,7 +14,7 @@ from validate.errors import ComparisonError, SceneError, UsageError
 from validate.fem.system import build
 from validate.parameters import with_given
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.body_dynamics import BodyRanges, Machine, MeasuredBody, SeenOf
+from validate.pipeline.bodies.choices import BodyRanges, Machine, MeasuredBody, SeenOf
 from validate.pipeline.bodies.measured import touching
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Built, Tree

@@ -7,7 +7,7 @@ import pytest
 
 from validate.errors import UsageError
 from validate.parameters import with_values
-from validate.pipeline.bodies.body_dynamics import MeasuredBody, SeenOf
+from validate.pipeline.bodies.choices import MeasuredBody, SeenOf
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, folder_of, mesh_files

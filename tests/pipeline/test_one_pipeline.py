@@ -220,7 +220,7 @@ def test_a_stand_in_takes_a_slow_methods_place_on_every_mesh(base: Experiment) -
 
     slow = replace(base.methods["fem"], scene={"dilatation": "pointwise"})
     methods = {"slow": slow, "fast": base.methods["fem"]}
-    uncertainty = replace(FINER, stand_in={"slow": "fast"})
+    uncertainty = Uncertainty(vary("body.cells", "x 2 3"), stand_in={"slow": "fast"})
     experiment = declared(
         base, build=build, methods=methods, accepted=("slow",), uncertainty=uncertainty,
         reference="fast",

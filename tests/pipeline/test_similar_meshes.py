@@ -12,7 +12,8 @@ from validate.commands.questions.scene import geometry_of
 from validate.fem.system import build
 from validate.parameters import describe, with_values
 from validate.pipeline import load
-from validate.pipeline.bodies.body_dynamics import MeasuredBody, model_of
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.first_modes import model_of
 from validate.pipeline.bodies.measured import measured_body, solid, static_scene
 from validate.pipeline.bodies.mesh import mesh_of, unknowns_of
 from validate.pipeline.experiment.tree import Meshes, Tree

@@ -20,7 +20,7 @@ from test_measured_body import (
 
 from validate.compare.verdict import Accept
 from validate.pipeline import run_in_memory
-from validate.pipeline.bodies.body_dynamics import BodyRanges, SeenOf
+from validate.pipeline.bodies.choices import BodyRanges, SeenOf
 from validate.pipeline.checks.checks import drive_inputs
 from validate.recording.types import Markers, Signal
 from validate.register.observation import Selection

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from validate.catalogue import experiment_files
 from validate.errors import UsageError
 from validate.parameters import describe, value_at
-from validate.pipeline.bodies.body_dynamics import MeasuredBody
+from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.experiment.experiment import Case, Variant, vary
 from validate.pipeline.experiment.find import load_file
 from validate.pipeline.experiment.tree import TrackedTwin, Tree

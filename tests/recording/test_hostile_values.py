@@ -13,7 +13,7 @@ from command_line import here, refused
 from mcap.writer import Writer
 
 from validate.errors import RecordingError
-from validate.recording.mcap.third_party_channels import decode_picture
+from validate.recording.mcap.known_messages import decode_picture
 from validate.recording.mcap.write import write_recording
 from validate.recording.tables.blocks import parse_tables
 from validate.recording.types import Frames, Recording, Source

@@ -16,13 +16,13 @@ from validate.recording.images import image_stack
 from validate.recording.images.image import MAX_SIDE, shallow
 from validate.recording.images.image_stack import read_image_stack
 from validate.recording.images.video import read_video
-from validate.recording.mcap import third_party_channels as raw
-from validate.recording.mcap.third_party_channels import RawImage, decode_picture
+from validate.recording.mcap import known_messages as raw
+from validate.recording.mcap.known_messages import RawImage, decode_picture
 from validate.recording.readers import recognised
 
 pytestmark = pytest.mark.usefixtures("decoded_here")
 
-# private: _message_numbers: called alone, case by case.
+# private: _numbers: called alone, case by case.
 
 SAID = {"m_per_px": "0.1mm", "rate": "20"}
 
@@ -266,6 +266,6 @@ def test_images_beyond_all_bytes_of_a_stack_are_refused(
 
 def test_rows_of_a_raw_image_that_are_cut_are_refused() -> None:
     with pytest.raises(RecordingError, match="11 bytes for 3 x 2 px of 2; truncated"):
-        raw._message_numbers(RawImage("yuv422", 2, 3, 6, bytes(11), False), 2, 1)
-    found = raw._message_numbers(RawImage("mono16", 1, 2, 6, b"\0\1\0\2\\9\\9", True), 1, 2)
+        raw._numbers(RawImage("yuv422", 2, 3, 6, bytes(11), False), 2, 1)
+    found = raw._numbers(RawImage("mono16", 1, 2, 6, b"\0\1\0\2\\9\\9", True), 1, 2)
     assert found[..., 0].tolist() == [[1, 2]]

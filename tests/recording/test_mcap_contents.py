@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from validate.errors import RecordingError
 from validate.installation import install_command
-from validate.recording.mcap import decoders, third_party_channels
+from validate.recording.mcap import decoders, known_messages, third_party_channels
 from validate.recording.mcap.decoders import decoder_of
 from validate.recording.mcap.integrity import verify
 from validate.recording.mcap.records import (
@@ -289,18 +289,18 @@ def test_clouds_that_are_cut_are_refused(
     offsets: dict[str, tuple[int, int]], stride: int, says: str
 ) -> None:
     with pytest.raises(RecordingError, match=says):
-        third_party_channels._packed(bytes(24), offsets, stride, "<", 2)
+        known_messages._packed(bytes(24), offsets, stride, "<", 2)
     whole = np.arange(6, dtype=">f4").tobytes()
     at = {"x": (0, 7), "y": (4, 7), "z": (8, 7)}
-    assert third_party_channels._packed(whole, at, 12, ">", 2).tolist() == [[0, 1, 2], [3, 4, 5]]
+    assert known_messages._packed(whole, at, 12, ">", 2).tolist() == [[0, 1, 2], [3, 4, 5]]
 
 
 def test_too_many_points_and_numbers_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(third_party_channels, "MAX_POINTS", 1)
+    monkeypatch.setattr(known_messages, "MAX_POINTS", 1)
     with pytest.raises(RecordingError, match="2 points, the limit is 1"):
-        third_party_channels._points(0, "lab", np.zeros((2, 3)))
+        known_messages._points(0, "lab", np.zeros((2, 3)))
     with pytest.raises(RecordingError, match="2 points, the limit is 1"):
-        third_party_channels._packed(bytes(24), {}, 12, "<", 2)
+        known_messages._packed(bytes(24), {}, 12, "<", 2)
     monkeypatch.setattr(third_party_channels, "MAX_NUMBERS", 5)
     gathered = {1: SimpleNamespace(add=lambda message: 3)}
     messages = [Message(1, 0, 0, 0, b"")] * 2

@@ -220,7 +220,9 @@ def test_captions_of_maps_have_units(made: dict[str, DrawnExhibit]) -> None:
 
 
 @pytest.mark.slow
-def test_maps_are_rendered_where_gl_is(result: Result) -> None:
+@pytest.mark.usefixtures("drawn_figures")
+def test_maps_are_rendered_where_gl_is(result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VALIDATE_NO_GL", raising=False)
     if not gl.available():
         no_gl()
     from validate.report.scenes.panels import rendered

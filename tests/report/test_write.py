@@ -51,6 +51,7 @@ def test_files_without_gl(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("drawn_figures")
 def test_figures_are_whole_pictures(tmp_path: Path) -> None:
     folder = write_report(small_result(), tmp_path / "cube", created=CREATED).parent
     for path in (folder / "figures").iterdir():

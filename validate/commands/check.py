@@ -19,7 +19,7 @@ from validate.engine.execution import CELLS
 from validate.engine.pool import Pool
 from validate.errors import UsageError, ValidateError
 from validate.library.single_run import by_cells
-from validate.pipeline.bodies.body_dynamics import assumed_density, first_frequencies
+from validate.pipeline.bodies.first_modes import assumed_density, first_frequencies
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.origins import Opened, opened

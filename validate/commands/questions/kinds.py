@@ -8,7 +8,7 @@ from typing import Any
 from validate.commands.questions.answers import Answers, Question
 from validate.errors import UsageError
 from validate.parameters import with_values
-from validate.pipeline.bodies.body_dynamics import MeasuredBody
+from validate.pipeline.bodies.choices import MeasuredBody
 from validate.pipeline.bodies.drive import FEWEST
 from validate.pipeline.bodies.markers import AS_SEEN
 from validate.pipeline.plates.scene import recorded_sides

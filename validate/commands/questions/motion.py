@@ -21,13 +21,12 @@ from validate.pipeline.bodies.body_dynamics import (
     EXPLICIT_FILTERS,
     METHODS,
     against_mode,
-    first_frequencies,
     fits_motion,
     model_law,
-    model_of,
 )
 from validate.pipeline.bodies.drive import drive_kind, mover, weight_beside
 from validate.pipeline.bodies.dynamics_registration import started, steps_of, without_rest
+from validate.pipeline.bodies.first_modes import first_frequencies, model_of
 from validate.pipeline.bodies.markers import leading
 from validate.pipeline.bodies.measured import static_scene
 from validate.pipeline.bodies.mesh import mesh_of, unknowns_of

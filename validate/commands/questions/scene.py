@@ -14,7 +14,8 @@ from validate.commands.questions.kinds import NONE, NOTED, UNKNOWN, sides, unit_
 from validate.commands.questions.law import coefficient_values, left_open
 from validate.errors import SceneError, UsageError
 from validate.parameters import describe, with_values
-from validate.pipeline.bodies.body_dynamics import WATER, MeasuredBody
+from validate.pipeline.bodies.choices import MeasuredBody
+from validate.pipeline.bodies.first_modes import WATER
 from validate.pipeline.bodies.mesh import grid_unknowns
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording

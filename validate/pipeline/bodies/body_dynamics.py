@@ -1,4 +1,4 @@
-"""Measured body in motion: settings, first frequencies, methods, damping, uncertain parameters.
+"""Dynamics of a measured body: methods, damping and uncertain parameters.
 
 One scene, one registration and one error budget for everything that moves a body: a release, a
 weight, a force, a pressure or a displacement over time. What differs is the load alone.
@@ -6,7 +6,7 @@ weight, a force, a pressure or a displacement over time. What differs is the loa
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -15,7 +15,7 @@ import numpy as np
 
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.compare.score import Score
-from validate.errors import ComparisonError, SceneError, UsageError, ValidateError
+from validate.errors import ComparisonError, UsageError, ValidateError
 from validate.estimate.ensemble.ensemble_kf import EnsembleKf
 from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.filterpy.filters import FilterpyFilter
@@ -25,8 +25,6 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.estimate.reduced.reduced_kf import ReducedKf
-from validate.fem.critical import Modes
-from validate.fem.system import build
 from validate.identify.recorded_motion import (
     FRACTION,
     RecordedMotion,
@@ -35,7 +33,7 @@ from validate.identify.recorded_motion import (
     spectrum,
 )
 from validate.numbers import scale, shown_unit
-from validate.parameters import Ranges, quantity, take_units
+from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.dynamics_registration import (
     FIRST,
     moving_markers,
@@ -44,7 +42,14 @@ from validate.pipeline.bodies.dynamics_registration import (
     started,
     without_rest,
 )
-from validate.pipeline.bodies.own_body import with_law
+from validate.pipeline.bodies.first_modes import (
+    Changes,
+    assumed_density,
+    first_frequencies,
+    is_quadratic,
+    law_of,
+    model_of,
+)
 from validate.pipeline.experiment.experiment import (
     Experiment,
     Identified,
@@ -54,89 +59,24 @@ from validate.pipeline.experiment.experiment import (
     vary,
 )
 from validate.pipeline.experiment.method import Method
-from validate.pipeline.experiment.tree import Meshes, Tree
+from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
 from validate.report.sections.motion_words import motion_words, rests
 from validate.scene.material import LawName
-from validate.scene.scene import Probe, Scene, Weight
+from validate.scene.scene import Probe, Scene
 from validate.solve.dynamic.implicit import FromEquilibrium
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.static.quasi_static import QuasiStatic
 
-# --- first natural frequencies of a supported body -----------------------------------------------
-
 # --- What a method changes of a measured body's scene: its law, and the element of its cells.
-
-Changes = Mapping[str, Any]  # values by path, as a method's `scene`
-_QUADRATIC = ("quadratic", "hex27", "tet10")
-
-
-def model_of(law: LawName, element: str = "") -> dict[str, str]:
-    """Return the changes by path; without an element that of the declared body."""
-    return {"material.law": law, **({"body.element": element} if element else {})}
-
-
-def law_of(method: Method, p: Tree) -> str:
-    """Return the law that a method has of the declared scene's material."""
-    return str((method.scene or {}).get("material.law", p.scene.material.law))
-
-
-def element_of(method: Method, p: Tree) -> str:
-    """Return the element of the cells that a method is solved in."""
-    return str((method.scene or {}).get("body.element", p.scene.body.element))
-
-
-def is_quadratic(element: str) -> bool:
-    return element in _QUADRATIC
 
 
 # -------------------------------------------------------------------------------------------------
 
-COUNT = 3
-WATER = 1000.0  # kg/m3: the density of a body of which nobody said one
-_MOST = 60_000  # unknowns
-_RIGID = 1e-3  # Hz: below it a motion is one of the whole body
-
-
-def assumed_density(p: Any) -> str:
-    """Words on a density that nobody stated, of a measured body; empty of one that counts in what
-    is simulated, or that was set, and of other experiments."""
-    if not isinstance(p, Tree) or not isinstance(p.settings, MeasuredBody):
-        return ""
-    rho, weighed = p.scene.material.rho, any(isinstance(x, Weight) for x in p.scene.loads)
-    if p.settings.motion.how == "dynamic" or weighed or rho != WATER:
-        return ""
-    return f"with an assumed density of {rho:g} kg/m3, near that of water"
-
-
-def first_frequencies(scene: Scene, count: int = COUNT) -> tuple[float, ...]:
-    """Hz of the lowest modes of the undeformed body, undamped, without its fluid.
-
-    Raises `SceneError` for a body that can move as a whole, has no density, or more unknowns than
-    are worth a look at its modes.
-    """
-    if scene.mesh.nodes.size > _MOST:
-        raise SceneError(
-            f"{scene.mesh.nodes.size} unknowns; modes are computed for at most {_MOST}"
-        )
-    bare = replace(scene, cavities=(), material=replace(scene.material, stiffness_damping=0.0))
-    system = build(with_law(bare, "linear"))
-    try:
-        modes = Modes.of(system, min(count, len(system.free)))
-    except (np.linalg.LinAlgError, RuntimeError) as singular:
-        raise SceneError(f"no natural frequencies: {singular}; is the body held?") from None
-    found = modes.omega[:count] / (2 * np.pi)
-    if not found[0] > _RIGID:
-        raise SceneError(f"a natural frequency of {found[0]:.2g} Hz: the body can move as a whole")
-    return tuple(found.tolist())
-
-
-# --- dynamics of a measured body: methods, damping and uncertain parameters ----------------------
 
 # --- The recorded motion as a report shows it: over time along where it is largest, its
 # spectrum, and its facts beside the body's first modes.
@@ -528,146 +468,3 @@ def doubting(
     return replace(
         found, headline=headline, doubts=(*found.doubts, why), notes=(*found.notes, seen)
     )
-
-
-# --- settings of a measured body besides its scene: observations, motion, machine ----------------
-
-Pose = Literal["recorded", "declared", "fitted"]
-
-
-@dataclass(frozen=True)
-class SeenOf:
-    """What of the recording is compared; what is none is not.
-
-    A "fitted" pose has the declared directions, its plane passes through the body's middle, and the
-    outline at rest has its centroid where the body's section has it: places are then fitted, and
-    only shapes and motions are evidence.
-    """
-
-    force: str | None = quantity(None, "1", "signal in N: the force on the moved place")
-    markers: str | None = quantity(None, "1", "markers' topic")
-    layout: str = quantity("as seen", "1", "markers' places: recorded, as seen, or a file")
-    stands: float = quantity(2e-3, "m", "largest distance of a marker from the body, as on a stalk")
-    outline: str | None = quantity(None, "1", "outlines' topic")
-    surface: str = quantity("surface", "1", "facet set the outlines show; surface: the whole one")
-    pose: Pose = quantity("recorded", "1", "pose of the images: recorded, declared or fitted")
-    origin: tuple[float, ...] = quantity((), "m", "of the images, where it is declared")
-    image_x: str = quantity("+x", "1", "direction of the images' x (columns), where not recorded")
-    image_y: str = quantity("-z", "1", "direction of the images' y (rows), where not recorded")
-    states: int = quantity(30, "1", "instants that are solved and compared, evenly spaced")
-    still: float = quantity(0.0, "s", "from the first instant, in which the body is unloaded")
-    fit_to: float = quantity(0.5, "1", "share of the load below which an open E is identified")
-    registration: MarkerFit = MarkerFit()
-
-    def __post_init__(self) -> None:
-        take_units(self)
-        if not (2 <= self.states <= 500 and 0 < self.fit_to < 1 and self.still >= 0):
-            raise UsageError(
-                f"seen.states {self.states} (2 to 500), fit_to {self.fit_to:g} (between 0 and 1), "
-                f"still {self.still:g} s (0 or above): set them within these limits"
-            )
-
-
-@dataclass(frozen=True)
-class BodyMotion:
-    """Whether the body's motion in time is solved, from when to when, and its damping.
-
-    Until the start the body rests; loads and displacements count from there. Damping is that of
-    the stiffness: `material.stiffness_damping`, the share of critical damping at the first mode, or
-    what is identified on the ring-down in the first `fit_window`. A load is released at the start
-    where the force that held its place, or the displacement, is given.
-    """
-
-    how: Literal["static", "dynamic"] = quantity("static", "1", "static: no inertia; or dynamic")
-    start: float | None = quantity(
-        None, "s", "start of the motion on the recording's clock; none: detected"
-    )
-    length: float | None = quantity(None, "s", "solved and compared; none: to the end")
-    dt: float | None = quantity(None, "s", "time step; none: 40 or more in the recorded period")
-    damping_ratio: float | None = quantity(None, "1", "of critical damping, at the first mode")
-    fit_window: float | None = quantity(
-        None, "s", "from the start, in which damping is identified; only later is evidence"
-    )
-    held_force: float | None = quantity(
-        None, "N", "force that held the released place, along the load"
-    )
-    held_displacement: float | None = quantity(
-        None, "m", "displacement at which the released place was held, along the load"
-    )
-
-    def __post_init__(self) -> None:
-        take_units(self)
-        if self.damping_ratio is not None and not self.damping_ratio >= 0:
-            raise UsageError(f"motion.damping_ratio = {self.damping_ratio}: set it to 0 or above")
-        times = (self.length, self.dt, self.fit_window)
-        if any(value is not None and not value > 0 for value in times):
-            raise UsageError(
-                f"motion.length = {times[0]}, motion.dt = {times[1]}, motion.fit_window = "
-                f"{times[2]} s: each must be above 0"
-            )
-
-
-@dataclass(frozen=True)
-class Machine:
-    """Compliance of frame, load cell and grips: u_specimen = u_recorded - C F."""
-
-    compliance: float | None = quantity(None, "m/N", "of the machine; none: not known, taken as 0")
-    sd: float = quantity(0.0, "m/N", "standard uncertainty of a compliance that is given")
-    measured: str | None = quantity(
-        None, "1", "recording of a rigid block (same topics) that gives compliance and sd"
-    )
-
-    def __post_init__(self) -> None:
-        given = self.compliance
-        if (given is not None and not (np.isfinite(given) and given >= 0)) or not self.sd >= 0:
-            raise UsageError(
-                f"machine.compliance = {given} m/N, sd {self.sd:g} m/N: both must be 0 or above; a "
-                "rigid machine has 0"
-            )
-        if given is not None and self.measured:
-            raise UsageError(
-                "machine.compliance and machine.measured are both set: give one of them"
-            )
-
-
-@dataclass(frozen=True)
-class BodyRanges(Ranges):
-    E: float = quantity(0.05, "1", "relative, of a given modulus")
-    nu: float = quantity(0.01, "1", "of the Poisson ratio")
-    load: float = quantity(0.01, "1", "relative, of what moves or pulls the body")
-    rho: float = quantity(0.01, "1", "relative, of the density; of a motion in time")
-    damping: float = quantity(0.2, "1", "relative, of the damping; of a motion in time")
-    size: float = quantity(0.005, "1", "relative, of each size of the body; of an identified E")
-    contact: float = quantity(
-        0.0, "m", "of the start of the load: of an indenter's gap, of an identified E"
-    )
-    friction: float = quantity(
-        0.05, "1", "of an identified E: share of the way from sliding places to held ones"
-    )
-
-
-@dataclass(frozen=True)
-class MeasuredBody:
-    """What no scene holds of a measured body: what of the recording moves it is named as that drive
-    or load of the scene is.
-
-    One part moves the body: a drive or an indenter by a signal in m of its name, a load or pressure
-    by one in N or Pa, what follows tracked markers, or weight. A motion that nothing recorded was
-    `noted` by hand.
-    """
-
-    seen: SeenOf = SeenOf()
-    ranges: BodyRanges = BodyRanges()
-    machine: Machine = Machine()
-    motion: BodyMotion = BodyMotion()
-    noted: tuple[float, ...] = quantity(
-        (), "m", "motion, evenly from the first instant to the last; none: recorded"
-    )
-    scale: float = quantity(1.0, "1", "ratio of true to recorded load")
-    mesh: Meshes = Meshes()
-    by_method: tuple[tuple[str, float, float], ...] = quantity(
-        (), "1", "set by the run: modulus (Pa) of each model; the last number is 0"
-    )
-
-    def __post_init__(self) -> None:
-        take_units(self)

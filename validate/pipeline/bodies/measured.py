@@ -15,19 +15,11 @@ import numpy as np
 from validate.compare.result import Kind
 from validate.compare.verdict import Accept
 from validate.errors import SceneError, UsageError
-from validate.pipeline.bodies.body_dynamics import (
-    Changes,
-    SeenOf,
-    doubting,
-    element_of,
-    following,
-    in_motion,
-    is_quadratic,
-    law_of,
-    model_of,
-)
+from validate.pipeline.bodies.body_dynamics import doubting, following, in_motion
 from validate.pipeline.bodies.body_registration import place
+from validate.pipeline.bodies.choices import SeenOf
 from validate.pipeline.bodies.drive import drive_kind, mover, placed_points, pressing
+from validate.pipeline.bodies.first_modes import Changes, element_of, is_quadratic, law_of, model_of
 from validate.pipeline.bodies.mesh import (
     costs_of,
     even_axes,

@@ -17,9 +17,9 @@ from validate.arrays import Floats, rms
 from validate.errors import ComparisonError, SceneError, UsageError
 from validate.identify.budget import NOISE, IdentifiedValue, pattern
 from validate.identify.scaled_curve import PROPORTIONAL, ScaledFit, fit_proportional
-from validate.pipeline.bodies.body_dynamics import Changes, law_of
 from validate.pipeline.bodies.body_registration import LOW
 from validate.pipeline.bodies.drive import drive_kind, mover
+from validate.pipeline.bodies.first_modes import Changes, law_of
 from validate.pipeline.calibration.fitted_moduli import (
     COMMON,
     Moves,

@@ -25,7 +25,7 @@ from validate.errors import ValidateError
 from validate.identify.recorded_motion import RecordedMotion, Ringing, recorded_motion
 from validate.numbers import with_unit
 from validate.parameters import Parameter
-from validate.pipeline.bodies.body_dynamics import first_frequencies
+from validate.pipeline.bodies.first_modes import first_frequencies
 from validate.pipeline.run.method_run import MethodRun
 from validate.recording.scales import odd_scales
 from validate.recording.types import Recording

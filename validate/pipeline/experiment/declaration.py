@@ -39,7 +39,7 @@ DECLARED = ("name", "title", "source", "parameters", "methods", "accepted", "acc
 def kinds() -> Mapping[type, Callable[..., Experiment]]:
     """What makes an experiment, by the class of its settings; they read all formats, so that they
     are imported where one is asked for."""
-    from validate.pipeline.bodies.body_dynamics import MeasuredBody
+    from validate.pipeline.bodies.choices import MeasuredBody
     from validate.pipeline.bodies.measured import measured_body
     from validate.pipeline.plates.compression import compression
     from validate.pipeline.plates.inclusion import InclusionTest, inclusion_test
@@ -135,7 +135,7 @@ _MODULES = (
     "estimate.filters", "register.markers.quality", "register.sensing",
     "pipeline.calibration.calibration", "pipeline.experiment.tree", "pipeline.plates.scene",
     "pipeline.experiment.experiment", "pipeline.plates.inclusion",
-    "pipeline.bodies.body_dynamics", "pipeline.experiment.method", "pipeline.experiment.tree",
+    "pipeline.bodies.choices", "pipeline.experiment.method", "pipeline.experiment.tree",
     "pipeline.experiment.variation", "scene.contact", "scene.geometries.specification",
     "scene.geometries.hollow_block", "scene.geometries.indented_bodies", "scene.laws",
     "scene.material", "scene.material", "scene.scene", "scene.places", "scene.geometries.box",

@@ -97,7 +97,7 @@ def read_recording(path: Path) -> Recording:
 
 def read_all(path: Path, options: Options) -> Recording:
     """Return the recording in an MCAP file of anybody: streams of ours, and messages of others that
-    mean something (`third_party_channels`), as one.
+    mean something (`known_messages`), as one.
 
     Options: `m_per_px` of images without a scale, `/topic.field=UNIT` for a number in messages of
     other types, `unit` of markers and outlines that were wrongly declared in m. Raises as
