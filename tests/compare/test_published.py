@@ -91,3 +91,18 @@ def test_a_figure_that_nothing_of_ours_can_stand_beside_has_no_value() -> None:
     figure = Figure("mass", None, 3.0, None, "kg", "not comparable", "no mass", "Table 1")
     found = figure.beside({"told": {"mass": 9.0}})
     assert (found.ours, found.missing, found.verdict) == (None, "", "not comparable")
+
+
+def test_rows_that_no_run_reproduces_have_our_number_or_none() -> None:
+    """Ours beside a number of the set-up; a score beside a picture; nothing beside a citation."""
+    used = Figure.of_setup("width", 0.5, 0.25, "m", "Table 3").beside({})
+    assert (used.ours, used.theirs, used.verdict, used.result) == (
+        0.25,
+        0.5,
+        "not comparable",
+        False,
+    )
+    cited = Figure.uncompared("modulus", 5e3, "Pa", "section 1", Figure.CITED).beside({})
+    assert (cited.ours, cited.result) == (None, False)
+    shown = Figure.drawn("Fig. 6", "told:peak", "N", "Fig. 6", "a curve")
+    assert shown.beside({"told": {"peak": 2.0}}).ours == 2.0

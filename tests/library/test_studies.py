@@ -10,6 +10,7 @@ from command_line import here
 
 import validate
 from validate.errors import UsageError
+from validate.library.study_result import StudyResult
 
 pytestmark = pytest.mark.xdist_group("library")
 Q = "methods.kf.settings.Q=1e-12,1e-10"
@@ -58,3 +59,20 @@ def test_what_a_study_does_not_take_is_refused(pulled: Path) -> None:
         validate.study("stability", pulled, seeds=3)
     with pytest.raises(UsageError, match="give error"):
         validate.study("choose", pulled, error="1mm")
+
+
+def test_columns_of_one_value_are_no_dimension_and_a_million_combinations_are_the_most(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("xarray")
+    (tmp_path / "tables").mkdir()
+    study = StudyResult(tmp_path, {})
+
+    def cells(lines: list[str]) -> None:
+        (tmp_path / "tables" / "cells.csv").write_text("\n".join(lines) + "\n")
+
+    cells(["scheme,mesh,dt_s,error_m", *(f"newmark,4,{dt},{dt**2}" for dt in (1.0, 2.0))])
+    assert study.to_xarray().sizes == {"dt_s": 2}
+    cells(["a,b,error_m", *(f"{i},{i},0.5" for i in range(1001))])
+    with pytest.raises(UsageError, match="1002001 combinations"):
+        study.to_xarray("a", "b")
