@@ -30,7 +30,7 @@ from validate.compare.convergence import convergence
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Dilatation, Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
@@ -69,7 +69,7 @@ class Row:
 def beam(kind: str, cells: tuple[int, ...], dilatation: Dilatation, material: Material) -> Scene:
     mesh: Mesh = (box if kind.startswith("tet") else grid)(SIZE, cells)
     return Scene(
-        mesh if kind in ("tet4", "hex8") else quadratic(mesh),
+        mesh if kind in ("tet4", "hex8") else mesh.quadratic(),
         material,
         (Support("x0", (0, 1, 2)),),
         loads=(Weight("gravity", (0.0, 0.0, -1.0)),),

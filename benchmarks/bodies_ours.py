@@ -17,7 +17,7 @@ from validate.pipeline.experiment.experiment import Experiment, Variant
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.markers.markers import Together, observe_markers
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.markers.quality import as_declared
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -88,7 +88,7 @@ def experiment(body: Drawn, truth: list[float]) -> Experiment:
         rest = np.array(body.markers)
         names = tuple(f"m{i}" for i in range(len(rest)))
         x = np.stack([rest, rest + np.reshape(truth, (-1, 3))])
-        seen = observe_markers(
+        seen = MarkerObservation.of(
             Markers(_T, names, x, 0.0, "body"), dict(zip(names, rest, strict=True)), scene.mesh,
             stands=np.inf, registration=as_declared(names, rest, 0.0), together=_TOGETHER,
         )  # fmt: skip

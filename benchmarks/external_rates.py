@@ -29,7 +29,7 @@ from validate.numbers import significant
 from validate.pipeline import load
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.external.scheme import ExternalSimulator
@@ -101,7 +101,7 @@ def beam(kind: str, cells: tuple[int, ...], power: float = 1.5) -> Scene:
     mesh = replace(mesh, nodes=x * np.array(SIZE))
     mixed = kind != "tet10"
     return Scene(
-        quadratic(mesh) if kind != "hex8" else mesh, SILICONE, (Support("x0", (0, 1, 2)),),
+        mesh.quadratic() if kind != "hex8" else mesh, SILICONE, (Support("x0", (0, 1, 2)),),
         loads=(Weight("gravity", (0.0, 0.0, -1.0)),),
         dilatation="mixed" if mixed else "pointwise",
     )  # fmt: skip
@@ -117,7 +117,7 @@ def bar(kind: str, across: int) -> Scene:
     x[:, 2] = 1 - (1 - x[:, 2]) ** 2
     mesh = replace(mesh, nodes=x * size)
     whole = replace(BAR, body=replace(BAR.body, symmetry=()))
-    return whole.resolved(mesh if kind == "hex8" else quadratic(mesh))
+    return whole.resolved(mesh if kind == "hex8" else mesh.quadratic())
 
 
 def end(scene: Scene, u: Floats) -> Floats:

@@ -26,7 +26,7 @@ from validate.fem.cavity import CavitySurface, volume_form
 from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.condense import Condensed
 from validate.fem.system import build
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Pin, Scene, Support
 
@@ -55,7 +55,7 @@ class Loop:
 def phantom() -> Loop:
     """The phantom's condensed system, two nodes of its upper side beside the cavity's."""
     block = Block(0.060, 0.045, 0.070)
-    mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
+    mesh = block.around((9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
     held = (Support("x0", (0,)), Support("y0", (1,)), Support("x1", (0,)))
     pins, cavities = (Pin((0.0, 0.0, 0.035), (2,)),), (Cavity("inclusion", "cavity"),)
     fixed = Scene(mesh, Material(15.2e3, 0.485), held, pins, cavities=cavities)

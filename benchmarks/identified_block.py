@@ -19,9 +19,9 @@ from validate.pipeline.experiment.experiment import Experiment, Twin
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
-from validate.register.markers.markers import placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
-from validate.register.signals import driving, holds_at, validating
+from validate.register.signals import SignalObservation, holds_at
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
@@ -63,10 +63,14 @@ def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
 
 
 def place(recording: Recording, p: Any, its: Scene) -> Registered:
-    stage = driving(recording, "stage", "m")
-    cell = validating(recording, "cell", "N", quantity="force", trace="stage.force")
+    stage = SignalObservation.driving(recording, "stage", "m")
+    cell = SignalObservation.validating(
+        recording, "cell", "N", quantity="force", trace="stage.force"
+    )
     rest, *holds = holds_at(stage, stage.t, HOLDS, 1e-6)
-    return Registered((stage, placed_markers(recording, its.mesh), cell), tuple(holds), rest)
+    return Registered(
+        (stage, MarkerObservation.placed(recording, its.mesh), cell), tuple(holds), rest
+    )
 
 
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:

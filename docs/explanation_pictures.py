@@ -20,7 +20,7 @@ import validate
 from validate.compare.convergence import convergence
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Dilatation, Scene, Support, Weight
 from validate.solve.march import run_scheme
 from validate.solve.static.quasi_static import QuasiStatic
@@ -34,8 +34,8 @@ CELLS: dict[str, tuple[Callable[[], Mesh], Dilatation, str]] = {
     "tet4, nodal mean": (lambda: box(SIZE, (10, 3, 3)), "nodal_mean", "o--"),
     "hex8": (lambda: grid(SIZE, (10, 3, 3)), "pointwise", "s-"),
     "hex8, mixed": (lambda: grid(SIZE, (10, 3, 3)), "mixed", "s--"),
-    "tet10": (lambda: quadratic(box(SIZE, (10, 3, 3))), "pointwise", "^-"),
-    "tet10, mixed": (lambda: quadratic(box(SIZE, (10, 3, 3))), "mixed", "^--"),
+    "tet10": (lambda: box(SIZE, (10, 3, 3)).quadratic(), "pointwise", "^-"),
+    "tet10, mixed": (lambda: box(SIZE, (10, 3, 3)).quadratic(), "mixed", "^--"),
 }
 
 
@@ -51,7 +51,7 @@ def drop(mesh: Mesh, dilatation: Dilatation, nu: float) -> float:
 
 def locking() -> None:
     figure, ax = plt.subplots(figsize=(7.2, 3.6), layout="constrained")
-    finest = quadratic(grid(SIZE, (10, 3, 3)))
+    finest = grid(SIZE, (10, 3, 3)).quadratic()
     converged = [drop(finest, "mixed", nu) for nu in NU]
     for label, (mesh, dilatation, style) in CELLS.items():
         share = [drop(mesh(), dilatation, nu) / c for nu, c in zip(NU, converged, strict=True)]
@@ -78,7 +78,7 @@ def family(ax: Axes) -> None:
     band = 2 * convergence(sizes, [np.array([[a]]) for a in answers], 0, 2.0).u
     ax.plot(sizes, answers, "o", label="similar meshes")
     ax.errorbar(sizes[0], answers[0], band, color="C1", capsize=4, label="± 2 u_num")
-    ax.axhline(-drop(quadratic(grid(SIZE, FINE)), "mixed", 0.45), color="black", label="converged")
+    ax.axhline(-drop(grid(SIZE, FINE).quadratic(), "mixed", 0.45), color="black", label="converged")
     ax.set(xlim=(0, 11), xlabel="cell size / mm", ylabel="deflection / mm")
     ax.legend(fontsize="small")
 

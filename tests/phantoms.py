@@ -6,9 +6,9 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import Responses, build
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import Material
-from validate.scene.mesh import Kind, Mesh, boundary_facets, kuhn_cells, quadratic
+from validate.scene.mesh import Kind, Mesh, boundary_facets, kuhn_cells
 from validate.scene.scene import Cavity, Dilatation, Drive, Pin, Scene, Support
 
 BLOCK = Block(0.060, 0.045, 0.070)
@@ -19,8 +19,8 @@ COARSE_GRID = (7, 7, 9)
 
 @cache
 def phantom_mesh(grid: tuple[int, int, int] = PAPER_GRID, order: int = 1) -> Mesh:
-    mesh = block_with_inclusion(BLOCK, grid, CAPSULE)
-    return quadratic(mesh) if order == 2 else mesh
+    mesh = BLOCK.around(grid, CAPSULE)
+    return mesh.quadratic() if order == 2 else mesh
 
 
 def phantom_scene(
@@ -86,7 +86,7 @@ def grid_mesh(
         "tet4",
         {name: local[f] for name, f in facets.items()},
     )
-    return quadratic(mesh) if kind == "tet10" else mesh
+    return mesh.quadratic() if kind == "tet10" else mesh
 
 
 def _grid_facets(

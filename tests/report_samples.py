@@ -18,7 +18,7 @@ from validate.parameters import Parameter
 from validate.recording.types import Clock, Recording, Signal, Source
 from validate.register.observation import Selection
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, driving
+from validate.register.signals import SignalObservation
 from validate.report.long_table import LongTable
 from validate.report.scenes import gl
 from validate.report.sections.sections import Begun, parts
@@ -127,7 +127,7 @@ def recording(name: str, seed: int) -> tuple[Recording, Registered]:
         "load_cell", "validates", TIMES, force[:, None], "N", 0.02, "force.plate", "stage.force"
     )
     rest, loaded = (Selection(f"{q}mm", np.array([t])) for q, t in ((0, 0.0), (2, 1.0)))
-    return made, Registered((driving(made, "stage", "m"), seen), (loaded,), rest)
+    return made, Registered((SignalObservation.driving(made, "stage", "m"), seen), (loaded,), rest)
 
 
 def small_result() -> Result:

@@ -9,7 +9,7 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
-from validate.register.signals import driving, validating
+from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene
 from validate.twin.sensors import LoadCell, signal, streams
 from validate.twin.tracker import START_NS
@@ -79,6 +79,8 @@ def probed(
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    drive = driving(recording, PROBE, "m", after_rest=True)
-    seen = validating(recording, "force", "N", quantity="force", trace=f"{PROBE}.force.x")
+    drive = SignalObservation.driving(recording, PROBE, "m", after_rest=True)
+    seen = SignalObservation.validating(
+        recording, "force", "N", quantity="force", trace=f"{PROBE}.force.x"
+    )
     return Registered((drive, seen))

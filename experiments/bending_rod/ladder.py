@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from validate.pipeline.ladder.ladder import Ladder, PaperSetting, StabilityBody, Trial, turned
+from validate.pipeline.ladder.ladder import Ladder, PaperSetting, StabilityBody, Trial, Turned
 from validate.pipeline.swinging_block import swinging_trial
 from validate.recording.types import Recording
 
@@ -23,7 +23,7 @@ def _rod_trial(recording: Recording, parameters: Any, quick: bool) -> Trial:
     )
 
 
-_COARSE = turned(MP3, 3)
+_COARSE = Turned.of(MP3, 3)
 ROD_LADDER = Ladder(
     _rod_trial,
     StabilityBody(

@@ -14,9 +14,9 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.markers import MarkerObservation, placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, driving
+from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Cone, MeshFile
 from validate.scene.scene import Scene
 
@@ -87,9 +87,9 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     scaled time."""
     own: PressedCone = tree.settings
     mesh = FILE.resolved(Path(__file__).parent)
-    whole = placed_markers(recording, mesh, how=own.registration)
+    whole = MarkerObservation.placed(recording, mesh, how=own.registration)
     markers = whole.within(scene.mesh)
-    cell = driving(recording, "load_cell", "N", after_rest=True)
+    cell = SignalObservation.driving(recording, "load_cell", "N", after_rest=True)
     if scene.drives:
         return _plate(markers, cell)
     return _pushed(markers, cell, own.clock.scale)

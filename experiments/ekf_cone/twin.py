@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Recording
@@ -152,7 +152,7 @@ def load_table(scene: Scene, points: Floats, force: float, loads: int) -> LoadTa
     # Factorisations cost far more here than iterations do.
     stepper = StaticNewton(contraction=0.5, max_iterations=60).prepare(build(scene))
     step = _compression(stepper, force) / loads
-    rows, signs = barycentric_rows(scene.mesh, np.abs(points)), np.where(points < 0, -1.0, 1.0)
+    rows, signs = Rows.barycentric(scene.mesh, np.abs(points)), np.where(points < 0, -1.0, 1.0)
     state = stepper.rest()
     found = [(0.0, 0.0, np.zeros(points.shape))]
     while found[-1][0] < force:

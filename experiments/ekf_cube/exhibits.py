@@ -13,7 +13,7 @@ from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.run.method_run import Cases
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
-from validate.solve.haptic.rates import HAPTIC_HZ
+from validate.solve.haptic.rates import RealTime
 
 from .published import PRINTED_STEP
 from .rates import VISUAL_HZ, Integrator, cells_at, measured_rates, rates_exhibit
@@ -55,7 +55,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditi
         "fields_apart": fields_apart(cases[""], ("ekf_held", "nfem")),
     }
     for name, label in (("explicit", EXPLICIT), ("filter", FILTER), ("implicit", IMPLICIT)):
-        for hz in (VISUAL_HZ, HAPTIC_HZ):
+        for hz in (VISUAL_HZ, RealTime.haptic_hz):
             cells = cells_at(rates, label, hz)
             numbers[f"cells.{name}@{hz:g}Hz"] = np.nan if cells is None else cells
     model = Exhibit(

@@ -6,9 +6,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import build
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene
 
 
@@ -41,7 +40,7 @@ def locking_factor(scene: Scene, probe: str) -> float:
     )
     # Quadratic hexahedra lock near nu = .5, too; those of linear pressure do not.
     finer = replace(
-        small, body=quadratic(scene.mesh), dilatation="mixed" if scene.mesh.bricks else "pointwise"
+        small, body=scene.mesh.quadratic(), dilatation="mixed" if scene.mesh.bricks else "pointwise"
     )
     ours, reference = (_moved(s, np.array(points)) for s in (small, finer))
     length = float(reference @ reference)
@@ -55,5 +54,5 @@ def _moved(scene: Scene, points: Floats) -> Floats:
     system = build(scene)
     u = np.zeros(scene.mesh.nodes.size)
     u[system.free] = system.factor().solve(system.loads[system.free, 0])
-    moved: Floats = barycentric_rows(scene.mesh, points).apply(u.reshape(scene.mesh.nodes.shape))[0]
+    moved: Floats = Rows.barycentric(scene.mesh, points).apply(u.reshape(scene.mesh.nodes.shape))[0]
     return moved

@@ -22,7 +22,7 @@ from validate.pipeline.experiment.tree import Tree, beside
 from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.scene.geometries.box import box
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import read_mesh
 
 FOLDER, FILE = "mesh/liver", "Liver_Iso_935n_4408t.inp"
@@ -76,7 +76,7 @@ def generated_liver(cells: tuple[int, int, int] = CELLS) -> Mesh:
     """
     grid = box((2.0, 2.0, 2.0), cells)
     mesh = Mesh(_bent(grid.nodes - 1) * np.array(SIZE) / 2, grid.cells, "tet4")
-    if (cell_volumes(mesh) <= 0).any():
+    if (mesh.cell_volumes() <= 0).any():
         raise SceneError(f"{cells} cells: the bending turns a cell over; use other numbers")
     return mesh
 

@@ -9,7 +9,6 @@ from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.report.scenes.points import node_sets_picture
-from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene
 
 from ..ekf_cube.published import PRINTED_LIVER_STEP
@@ -67,7 +66,7 @@ def sets_exhibit(scene: Scene, body: str) -> Exhibit:
     named = {name[-1]: node for name, node in watched(mesh).items()}
     words = (
         f"The body: {body}, {len(mesh.nodes)} nodes and {len(mesh.cells)} tetrahedra, "
-        f"{1e3 * cell_volumes(mesh).sum():.3g} litres. Paper 003 draws its liver and prints no "
+        f"{1e3 * mesh.cell_volumes().sum():.3g} litres. Paper 003 draws its liver and prints no "
         "mesh, so its counts of nodes are not targets.",
         "Held: faces with an upward normal in the left three tenths of the length. Loaded: "
         "faces with an upward or downward normal in the right lobe. A is the loaded node "

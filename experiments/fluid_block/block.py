@@ -18,7 +18,7 @@ from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording, Source
 from validate.register.observation import Selection
 from validate.register.registration import Registered
-from validate.register.signals import driving, validating
+from validate.register.signals import SignalObservation
 from validate.scene.scene import Drive, Pin, Scene, Support
 from validate.solve.fluid.cavities import ElasticPressure, ExactPressure, PulsePressure
 from validate.solve.march import march
@@ -112,8 +112,10 @@ def build(recording: Recording, tree: Tree, changes: Mapping[str, Any] | None = 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     """The tool drives; its force and every cavity's pressure are compared, all states together."""
-    tool = driving(recording, "tool", "m")
-    seen = [validating(recording, "force", "N", quantity="force", trace="tool.force")]
+    tool = SignalObservation.driving(recording, "tool", "m")
+    seen = [
+        SignalObservation.validating(recording, "force", "N", quantity="force", trace="tool.force")
+    ]
     for cavity in scene.cavities:
         topic = cavity.name.replace("cavity", "pressure")
         if topic not in recording.signals:
@@ -122,7 +124,9 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
                 f"{len(scene.cavities)}; it has {sorted(recording.signals)}"
             )
         seen.append(
-            validating(recording, topic, "Pa", quantity=topic, trace=f"{cavity.name}.pressure")
+            SignalObservation.validating(
+                recording, topic, "Pa", quantity=topic, trace=f"{cavity.name}.pressure"
+            )
         )
     pressed = Selection("pressed", tool.t[1:], "every state under the tool")
     return Registered((tool, *seen), (pressed,))

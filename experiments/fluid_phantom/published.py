@@ -12,7 +12,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.compare.published import Figure, Values
 from validate.fem.system import Responses, build
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import Material
 from validate.scene.scene import Cavity, Drive, Pin, Scene, Support
 from validate.solve.fluid.pressure_curve import pressure_at_volume, tuned_gain
@@ -102,7 +102,7 @@ def _fig_4() -> Responses:
 @cache
 def _phantom() -> Responses:
     block = Block(0.060, 0.045, 0.070)
-    mesh = block_with_inclusion(block, (9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
+    mesh = block.around((9, 10, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.028))
     scene = Scene(
         mesh,
         Material(15.2e3, 0.485),

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from validate.arrays import Floats
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Markers
 from validate.register.outlines.plane import SurfaceSampler
 from validate.scene.mesh import Mesh
@@ -97,7 +97,7 @@ class Pen:
     ) -> Markers:
         """Every marker of the layout (3,) m under each field of u (nt, n, d) m, in its frame."""
         rest = np.array(list(layout.values()))
-        rows = barycentric_rows(mesh, rest)
+        rows = Rows.barycentric(mesh, rest)
         x = np.array([rest + rows.apply(ui) for ui in u])
         x = x + self.sd_tip * rng.standard_normal(x.shape)
         x = x + self.sd_hand * rng.standard_normal(x.shape)

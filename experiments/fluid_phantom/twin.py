@@ -15,9 +15,8 @@ from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
 from validate.register.outlines.plane import SurfaceSampler
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import LawName, Material
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.march import march
@@ -80,7 +79,7 @@ def record_phantom(
     capsule = Capsule((twin.centre_x, twin.centre_y, twin.centre_z), twin.radius, twin.length)
     progress("mesh")
     grid = (twin.nodes_x, twin.nodes_y, twin.nodes_z)
-    mesh = quadratic(block_with_inclusion(size, grid, capsule))
+    mesh = size.around(grid, capsule).quadratic()
     slipping = replace(declared, material=material, foundations=(), membranes=())
     scene = replace(slipping, dilatation="pointwise").resolved(mesh)
     progress(f"factorise {mesh.nodes.size} unknowns")

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError, UsageError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.parameters import known, quantity
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Recording
@@ -20,7 +20,7 @@ from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import grid, member
-from validate.scene.mesh import Kind, Mesh, quadratic
+from validate.scene.mesh import Kind, Mesh
 from validate.scene.places import Labelled, nodes_of
 from validate.scene.scene import DriveShape, Scene
 
@@ -69,7 +69,7 @@ class GelBoxes:
         low, high = self.ends()
         along, up = self.cells
         mesh = grid(tuple((high - low).tolist()), (along, along, up))
-        return quadratic(mesh) if self.element == "hex27" else mesh
+        return mesh.quadratic() if self.element == "hex27" else mesh
 
     def scaled(self, share: float) -> "GelBoxes":
         along, up = member(self.cells, share)
@@ -265,7 +265,7 @@ def inside_of(whose: Same, box: GelBoxes) -> DisplacementObservation:
     at, mesh = x[inside] - low, box.resolved(Path())
     _, sd = noise(x[inside], u[inside])
     return DisplacementObservation(
-        "particles", "validates", np.array([1.0]), at, u[inside], barycentric_rows(mesh, at), sd,
+        "particles", "validates", np.array([1.0]), at, u[inside], Rows.barycentric(mesh, at), sd,
         "inside",
     )  # fmt: skip
 

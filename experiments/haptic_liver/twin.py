@@ -24,12 +24,12 @@ from validate.pipeline.live import LIVE, as_given, recorded_tip
 from validate.pipeline.run.twin_record import made_here
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, validating
+from validate.register.signals import SignalObservation
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
 from validate.scene.tool import Needle
 from validate.solve.haptic.loop import HapticLoop
-from validate.solve.haptic.rates import HAPTIC_HZ
+from validate.solve.haptic.rates import RealTime
 from validate.solve.march import march
 from validate.twin.sensors import LoadCell, signal, streams
 from validate.twin.tracker import START_NS
@@ -76,7 +76,7 @@ class ToolSpring:
 @dataclass(frozen=True)
 class ToolPath:
     depth: float = quantity(0.006, "m", "depth of the hand below the resting surface")
-    rate: float = quantity(HAPTIC_HZ, "1/s", "samples a second")
+    rate: float = quantity(RealTime.haptic_hz, "1/s", "samples a second")
     tremor: float = quantity(2e-5, "m", "of the hand, rms along every axis")
     seed: int = quantity(3, "1", "seed of the tremor")
     seconds: float = quantity(STOPS[-1][0], "s", "part of the path that is used")
@@ -179,7 +179,9 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
         for c, a in enumerate(AXES)
     )
     seen = tuple(
-        validating(recording, f"{kind}.{a}", "N", quantity=f"{kind}.{a}", trace=f"{TOOL}.force.{a}")
+        SignalObservation.validating(
+            recording, f"{kind}.{a}", "N", quantity=f"{kind}.{a}", trace=f"{TOOL}.force.{a}"
+        )
         for kind in ("force", "given")
         for a in AXES
         if f"{kind}.{a}" in recording.signals

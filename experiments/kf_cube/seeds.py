@@ -14,7 +14,7 @@ from validate.compare.view import View
 from validate.estimate.filterpy.oracle import oracle_table
 from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.measurements import Measurements
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
@@ -100,7 +100,7 @@ def _noisy(followed: MethodRun) -> Floats:
 def _z_row(system: System, followed: MethodRun) -> Floats:
     """Row (1, N) that reads the observed node's z."""
     point = next(p.point for p in followed.scene.probes if p.name == "node_A")
-    weights = barycentric_rows(system.scene.mesh, np.array([point])).weights.toarray()
+    weights = Rows.barycentric(system.scene.mesh, np.array([point])).weights.toarray()
     return np.asarray(np.kron(weights, np.array([[0.0, 0.0, 1.0]])))
 
 

@@ -16,7 +16,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.tables.stretch import read_stretch_stress
 from validate.recording.types import Recording, Signal
 from validate.register.registration import Registered
-from validate.register.signals import driving
+from validate.register.signals import SignalObservation
 from validate.scene.meshless import MaterialPoint, StretchMode
 
 from .laws import (
@@ -223,4 +223,4 @@ def place(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
         "stress", "validates", stress.t, stress.y, ranges.reading,
         0.0 if fitted else float(np.sqrt(2)) * ranges.axis, f"stress.{scene.mode}",
     )  # fmt: skip
-    return Registered((driving(recording, "stretch", "1"), seen), timed=False)
+    return Registered((SignalObservation.driving(recording, "stretch", "1"), seen), timed=False)

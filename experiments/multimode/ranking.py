@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.pipeline.run.method_run import MethodRun
-from validate.register.observation import EVERYTHING
+from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.scene.laws import LAWS, lost_stability
 from validate.scene.meshless import StretchMode
@@ -98,7 +98,7 @@ def mode_of(seen: Registered) -> StretchMode:
 def errors(p: Multimode, law: LawCard, seen: Registered) -> Floats:
     """Relative errors (k,) of a law's coefficients in one mode, as the comparison has them."""
     run = StretchTest().solve(point(p, law, mode_of(seen)), seen.t, seen.inputs)
-    (found,) = stress_of(seen).deviations(run, EVERYTHING)
+    (found,) = stress_of(seen).deviations(run, Selection("all"))
     return found.values[:, 0]
 
 

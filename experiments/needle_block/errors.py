@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
 from validate.compare.shapes.pair import Common, Field, pair
 from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compared
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import System
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.run.method_run import MethodRun
@@ -75,7 +75,7 @@ def errors_of(
     Fields of another mesh are read at the nodes of `on`, located once for all frames.
     """
     rows = (
-        None if np.array_equal(mesh.nodes, on.mesh.nodes) else barycentric_rows(mesh, on.mesh.nodes)
+        None if np.array_equal(mesh.nodes, on.mesh.nodes) else Rows.barycentric(mesh, on.mesh.nodes)
     )
     common = Common(on.mesh, on)
     chosen = frames_of(one.t, one.at.tolist()) if frames is None else list(frames)

@@ -1,11 +1,11 @@
 """The ladder of paper 002's block: where it is stable."""
 
-from validate.pipeline.ladder.ladder import Ladder, PaperSetting, StabilityBody, turned
+from validate.pipeline.ladder.ladder import Ladder, PaperSetting, StabilityBody, Turned
 from validate.scene.scene import Load
 
 from .body import MP1, MP2, STEP, needle_block
 
-_MEDIUM = turned(MP1, 10)
+_MEDIUM = Turned.of(MP1, 10)
 NEEDLE_LADDER = Ladder(
     body=StabilityBody(
         "paper 002's block (unit square, quadrilaterals in plane strain)",
@@ -15,7 +15,7 @@ NEEDLE_LADDER = Ladder(
         STEP,
         (
             PaperSetting("002 MP1", "paper 002, section IV.A", _MEDIUM, STEP),
-            PaperSetting("002 MP2", "paper 002, section IV.A", turned(MP2, 10), STEP),
+            PaperSetting("002 MP2", "paper 002, section IV.A", Turned.of(MP2, 10), STEP),
         ),
         Load("shear", "x1", (0.0, 1.0)),
     )

@@ -11,9 +11,9 @@ from validate.arrays import Floats
 from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.tree import Built, Tree, beside
 from validate.recording.types import Recording
-from validate.register.observation import EVERYTHING
+from validate.register.observation import Selection
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, validating
+from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene
 from validate.scene.tool import Needle
 
@@ -95,11 +95,11 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
         for c, a in enumerate(AXES[: scene.mesh.dimension])
     )
     seen = tuple(
-        validating(recording, topic, unit, quantity=topic, trace=trace)
+        SignalObservation.validating(recording, topic, unit, quantity=topic, trace=trace)
         for topic, unit, trace in compared(scene.mesh.dimension)
         if topic in recording.signals
     )
-    return Registered((*drives, *seen), (EVERYTHING,), findings=path.findings)
+    return Registered((*drives, *seen), (Selection("all"),), findings=path.findings)
 
 
 def compared(d: int) -> tuple[tuple[str, str, str], ...]:

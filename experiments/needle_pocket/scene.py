@@ -11,9 +11,9 @@ from typing import Literal
 
 from validate.parameters import quantity
 from validate.scene.geometries.hollow_block import Cavities, HollowBlock
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Cavity, Scene, Support
 
 POCKET = "pocket"
@@ -44,7 +44,7 @@ class PocketBody:
     def resolved(self, folder: Path) -> Mesh:
         """The mesh. Raises `SceneError` for a pocket that it cannot hold."""
         mesh = self._plane() if self.space == "plane" else self._solid()
-        return quadratic(mesh) if self.element == "quadratic" else mesh
+        return mesh.quadratic() if self.element == "quadratic" else mesh
 
     def scaled(self, share: float) -> "PocketBody":
         """In 3-D half as far from this one: few cells do not resolve the capsule."""
@@ -60,7 +60,7 @@ class PocketBody:
     def _solid(self) -> Mesh:
         a = self.side
         shape = Capsule((a / 2, a / 2, a / 2), self.radius, self.length, axis=2)
-        mesh = block_with_inclusion(Block(a, a, a), (self.solid + 1,) * 3, shape)
+        mesh = Block(a, a, a).around((self.solid + 1,) * 3, shape)
         facets = {"bottom": "y0", "top": "y1", POCKET: "cavity"}
         return Mesh(
             mesh.nodes - [a / 2, a, a / 2], mesh.cells, mesh.kind,

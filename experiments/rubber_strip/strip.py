@@ -15,7 +15,7 @@ from validate.parameters import quantity
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording, Signal
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, driving
+from validate.register.signals import SignalObservation
 from validate.scene.meshless import MaterialPoint
 
 from .points_file import read_points
@@ -104,4 +104,6 @@ def place(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
         first, role="validates", t=across.t[-1:], y=across.y[-1:], quantity=LAST,
         sd=float(np.hypot(across.sd, float(said["apart"]))),
     )  # fmt: skip
-    return Registered((driving(recording, "axial", "1"), first, last), timed=False)
+    return Registered(
+        (SignalObservation.driving(recording, "axial", "1"), first, last), timed=False
+    )

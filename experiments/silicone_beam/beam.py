@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats, rms
-from validate.fem.assembly.locate import standing_rows
+from validate.fem.assembly.locate import Rows
 from validate.pipeline.experiment.experiment import Identified
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.recording.types import Markers, Recording
-from validate.register.markers.markers import MarkerObservation, Together, observe_markers
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Deviation, Selection, Simulated
 from validate.register.registration import Registered
 from validate.register.scene_registration import given_inputs
@@ -77,7 +77,7 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     p: ReleasedBeam = tree.settings
     still, moving = recording.marker(REST), recording.marker(SWING)
     layout = {name: np.array(at) for name, at in LAYOUT.items()}
-    whole = observe_markers(still, layout, scene.mesh, how=p.registration, stands=_STANDS)
+    whole = MarkerObservation.of(still, layout, scene.mesh, how=p.registration, stands=_STANDS)
     if scene.material.law == "linear":
         return _tracked(whole, moving, p, scene)
     tips = _from_where_they_stand(whole, scene.mesh, p.ranges.repeats)
@@ -132,7 +132,7 @@ def _tracked(
     rest = np.array([LAYOUT[name] for name in TIPS])
     tips = replace(
         whole, names=TIPS, t=moving.t[kept], x=rest + moved, rest=rest,
-        positions=standing_rows(scene.mesh, rest), sd=_noise(_moved(whole, moving)), axis_sd=(),
+        positions=Rows.standing(scene.mesh, rest), sd=_noise(_moved(whole, moving)), axis_sd=(),
         tre=np.full(len(TIPS), np.sqrt(3) * p.ranges.repeats),
     )  # fmt: skip
     inputs = given_inputs(scene, tips.t)
@@ -158,7 +158,7 @@ def _from_where_they_stand(
         - whole.registration.tre_at(np.broadcast_to(centre, moved.shape)) ** 2
     )
     return replace(
-        whole, names=TIPS, x=x, rest=rest, positions=standing_rows(mesh, rest),
+        whole, names=TIPS, x=x, rest=rest, positions=Rows.standing(mesh, rest),
         sd=repeats / np.sqrt(2), axis_sd=(), tre=np.hypot(turned, np.sqrt(1.5) * repeats),
         together=TOGETHER,
     )  # fmt: skip

@@ -9,7 +9,7 @@ from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Markers, Recording
-from validate.register.markers.markers import Together, observe_markers
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -60,7 +60,7 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     cell = SignalObservation("force", "validates", t[mine], curve.force[:, None], FORCE,
                              curve.sd, "force", "moving.force")  # fmt: skip
     layout = {n: np.append(x, 0.0) for n, x in zip(points.names, points.x[0, :, :2], strict=True)}
-    seen = observe_markers(_at(points, t[~mine]), layout, scene.mesh, together=TOGETHER,
+    seen = MarkerObservation.of(_at(points, t[~mine]), layout, scene.mesh, together=TOGETHER,
                            name="points")  # fmt: skip
     said = (
         f"{recording.record('pairing')['images']} images are paired with force samples by pad "

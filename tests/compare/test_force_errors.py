@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.arrays import Floats
-from validate.compare.force_error import force_pair, force_scores
+from validate.compare.force_error import ForcePair
 from validate.errors import ComparisonError
 from validate.recording.types import Signal
 
@@ -20,9 +20,7 @@ def signal(y: Floats, t: Floats = T, unit: str = "N") -> Signal:
 
 
 def scores(run: Signal, reference: Signal) -> dict[str, float]:
-    return {
-        s.name: s.value for s in force_scores(force_pair("F", run, reference, 0.5, "reference"))
-    }
+    return {s.name: s.value for s in ForcePair.of("F", run, reference, 0.5, "reference").scores()}
 
 
 def test_identical_forces_are_zero() -> None:
@@ -61,16 +59,16 @@ def test_half_of_the_run_must_overlap_for_a_phase() -> None:
 def test_only_times_that_the_run_meets_are_counted() -> None:
     """The run stops at 3 s and has a gap of 1 s, which also takes the sample it begins with."""
     t = T[(T <= 3.0) & ~((T > 0.5) & (T < 1.5))]
-    force = force_pair("F", signal(pulse(t), t), signal(pulse(T)), 0.5, "reference")
+    force = ForcePair.of("F", signal(pulse(t), t), signal(pulse(T)), 0.5, "reference")
     assert len(force.t) == len(t) - 1
     assert np.array_equal(force.y, force.y_reference)
-    found = force_scores(force)
+    found = force.scores()
     assert all(s.count == len(t) - 1 for s in found)
 
 
 def test_every_score_has_its_unit_and_definition() -> None:
     forces = signal(pulse(T)), signal(1.1 * pulse(T))
-    found = force_scores(force_pair("F", *forces, 0.5, "reference"))
+    found = ForcePair.of("F", *forces, 0.5, "reference").scores()
     units = {s.name: s.unit for s in found}
     assert units == {
         "F.peak": "N", "F.peak.relative": "1", "F.rms": "N", "F.rms.relative": "1",
@@ -82,9 +80,9 @@ def test_every_score_has_its_unit_and_definition() -> None:
 def test_what_cannot_be_compared_is_refused() -> None:
     y = pulse(T)
     with pytest.raises(ComparisonError, match="in N against 1 in mN"):
-        force_pair("F", signal(y), signal(y, unit="mN"), 0.5, "reference")
+        ForcePair.of("F", signal(y), signal(y, unit="mN"), 0.5, "reference")
     with pytest.raises(ComparisonError, match="0 of 600 reference"):
-        force_pair("F", signal(y, T + 100), signal(y), 0.5, "reference")
+        ForcePair.of("F", signal(y, T + 100), signal(y), 0.5, "reference")
     with pytest.raises(ComparisonError, match="F: no phase error: "):
         scores(signal(np.sin(10 * np.pi * (T - 0.05))), signal(np.sin(10 * np.pi * T)))
     with pytest.raises(ComparisonError, match=r"F: no phase error.*0\."):
@@ -92,4 +90,4 @@ def test_what_cannot_be_compared_is_refused() -> None:
     with pytest.raises(ComparisonError, match="the reference force is always 0"):
         scores(signal(y), signal(0 * y))
     with pytest.raises(ComparisonError, match="expected a positive time"):
-        force_pair("F", signal(y), signal(y), 0.0, "reference")
+        ForcePair.of("F", signal(y), signal(y), 0.0, "reference")

@@ -7,13 +7,7 @@ import pytest
 from phantoms import CAPSULE, COARSE_GRID, phantom_mesh, phantom_responses
 
 from validate.arrays import Floats, rms
-from validate.compare.residual import (
-    Residual,
-    residuals,
-    rest_residuals,
-    stacked,
-    unanswered,
-)
+from validate.compare.residual import Residual, rest_residuals, stacked, unanswered
 from validate.compare.score import (
     METRICS,
     bias,
@@ -166,7 +160,7 @@ def changed(registered: Registered, kind: type, **values: object) -> Registered:
 
 
 def by_name(registered: Registered, run: Run) -> dict[str, Residual]:
-    return {r.name: r for r in residuals(registered, run)}
+    return {r.name: r for r in Residual.of(registered, run)}
 
 
 def test_a_run_against_itself_leaves_nothing(registered: Registered, run: Run) -> None:
@@ -222,20 +216,20 @@ def test_markers_not_seen_are_counted_out(registered: Registered, run: Run) -> N
     assert found["marker.inplane@4mm"].count == 3
     x[2] = np.nan
     with pytest.raises(ComparisonError, match=r"marker\.inplane@9mm: 0 matched points"):
-        residuals(changed(registered, MarkerObservation, x=x), run)
+        Residual.of(changed(registered, MarkerObservation, x=x), run)
 
 
 def test_a_run_that_ended_early_leaves_no_residual(registered: Registered, run: Run) -> None:
     """It has no error over the whole, so its checks have nothing and fail."""
-    assert len(residuals(registered, run)) == 20
-    assert residuals(registered, replace(run, outcome=Outcome("diverged", 2, "told so"))) == ()
-    assert residuals(registered, replace(run, t=run.t[:2])) == ()
+    assert len(Residual.of(registered, run)) == 20
+    assert Residual.of(registered, replace(run, outcome=Outcome("diverged", 2, "told so"))) == ()
+    assert Residual.of(registered, replace(run, t=run.t[:2])) == ()
 
 
 def test_a_hold_without_an_output_frame_is_refused(registered: Registered, run: Run) -> None:
     few = replace(run, at=run.at[:2], u=run.u[:2])
     with pytest.raises(ComparisonError, match="exact: 2 output frames, none at '9mm'"):
-        residuals(registered, few)
+        Residual.of(registered, few)
 
 
 def test_a_signal_without_its_trace_is_told_and_not_compared(
@@ -257,12 +251,12 @@ def test_a_signal_in_another_unit_than_its_trace_is_refused(
 ) -> None:
     units = changed(registered, SignalObservation, unit="kPa")
     with pytest.raises(ComparisonError, match=r"exact.*'stage.force'.* in kPa"):
-        residuals(units, run)
+        Residual.of(units, run)
 
 
 def test_nothing_near_in_time_is_zero_matches(registered: Registered, run: Run) -> None:
     with pytest.raises(ComparisonError, match="0 matched samples; check the clocks"):
-        residuals(changed(registered, SignalObservation, t=T + 100.0), run)
+        Residual.of(changed(registered, SignalObservation, t=T + 100.0), run)
 
 
 def test_rest_residuals_are_outline_and_markers_at_rest(registered: Registered, run: Run) -> None:

@@ -21,7 +21,6 @@ from validate.compare.shapes.pair import (
 from validate.compare.shapes.shape_error import (
     Boundaries,
     _beyond_booleans,
-    boundary_scores,
     distances,
     hausdorff,
     mean_absolute,
@@ -34,19 +33,19 @@ from validate.compare.shapes.shape_error import (
 from validate.compare.shapes.two_fields import compare_fields, compared
 from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
-from validate.scene.mesh import Mesh, cell_volumes, quadratic
+from validate.scene.mesh import Mesh
 
 # private: _beyond_booleans: says which of two methods the public call took.
 
 PLANE, SOLID = ((1.0, 0.8), (6, 5)), ((1.0, 0.8, 0.6), (4, 3, 3))
 MESHES = {
     "tri3": box(*PLANE),
-    "tri6": quadratic(box(*PLANE)),
+    "tri6": box(*PLANE).quadratic(),
     "quad4": grid(*PLANE),
     "tet4": box(*SOLID),
-    "tet10": quadratic(box(*SOLID)),
+    "tet10": box(*SOLID).quadratic(),
     "hex8": grid(*SOLID),
-    "hex27": quadratic(grid(*SOLID)),
+    "hex27": grid(*SOLID).quadratic(),
     "hole": square_with_hole(1.0, 0.2, 5),
 }
 
@@ -68,12 +67,12 @@ def along_x(mesh: Mesh, moved: Floats) -> Field:
 
 def test_boundaries_enclose_what_the_cells_fill(mesh: Mesh) -> None:
     """Also deformed, where bilinear facets are no planes: the volume is that of the Jacobians."""
-    assert enclosed(still(mesh).boundary) == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
+    assert enclosed(still(mesh).boundary) == pytest.approx(mesh.cell_volumes().sum(), rel=1e-13)
     bent = 0.03 * np.sin(4 * mesh.nodes[:, ::-1]) * np.sin(5 * mesh.nodes).prod(axis=1)[:, None]
     if mesh.order == 1:
         moved = Mesh(mesh.nodes + bent, mesh.cells, mesh.kind)
         assert enclosed(deformed_boundary(mesh, moved.nodes)) == pytest.approx(
-            cell_volumes(moved).sum(), rel=1e-13
+            moved.cell_volumes().sum(), rel=1e-13
         )
 
 
@@ -225,7 +224,7 @@ def test_an_outline_against_a_recorded_one() -> None:
     """Squares of 20 and 22 mm about one centre; the sense of an outline does not matter."""
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     run, seen = outline_boundary(0.011 * square), outline_boundary(0.010 * square[::-1])
-    found = {s.name: s for s in boundary_scores("cyst", Boundaries(run, seen, "recorded"))}
+    found = {s.name: s for s in Boundaries(run, seen, "recorded").scores("cyst")}
     assert found["cyst.E_s"].value == pytest.approx(0.21, rel=1e-12)
     assert found["cyst.hausdorff"].value == pytest.approx(1e-3 * np.sqrt(2), rel=1e-12)
     assert all(s.count == 8 and s.against == "recorded" for s in found.values())

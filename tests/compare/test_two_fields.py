@@ -16,18 +16,18 @@ from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compare_fields
 from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
 PLANE, SOLID = ((1.0, 0.8), (4, 3)), ((1.0, 0.8, 0.6), (3, 2, 2))
 MESHES = {
     "tri3": box(*PLANE),
-    "tri6": quadratic(box(*PLANE)),
+    "tri6": box(*PLANE).quadratic(),
     "quad4": grid(*PLANE),
     "tet4": box(*SOLID),
-    "tet10": quadratic(box(*SOLID)),
+    "tet10": box(*SOLID).quadratic(),
     "hex8": grid(*SOLID),
-    "hex27": quadratic(grid(*SOLID)),
+    "hex27": grid(*SOLID).quadratic(),
 }
 # Exponent of a length in each unit; the energy norm's by dimension at unit thickness.
 POWERS = {"1": 0.0, "m": 1.0, "m^2": 2.0, "m^3": 3.0}

@@ -23,7 +23,7 @@ from validate.estimate.kalman.displacement_filter import Estimate, Structure
 from validate.estimate.kalman.formulas import Gaussian, best_gain, kf_predict, kf_update
 from validate.estimate.kalman.kf_fem import KfFem, in_modes, modal_covariance
 from validate.estimate.kalman.modal_kf import ModalKf
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.load_scale import LoadScale, ScaleCore
 from validate.estimate.reduced.reduced_kf import (
     CoreStepper,
@@ -171,7 +171,7 @@ def test_gains_of_what_is_observed_are_those_of_the_whole(structure: Structure) 
     whole = modal_covariance(KfFem(structure=structure), big.system, seen, modes)
     assert isinstance(whole, Decoupled)
     known: Spaces = {}
-    narrow, when = observed(whole, 40, known), schedule(timetable(seen, DT))
+    narrow, when = observed(whole, 40, known), schedule(seen.timetable(DT))
     assert narrow is not None
     (space,) = known.values()
     again = observed(replace(whole, Q=7 * whole.Q, P0=0 * whole.P0), 40, known)
@@ -227,7 +227,7 @@ def test_gains_freeze_once_settled_and_thaw_where_something_is_missing(pulled: P
 def test_claims_walk_back_and_forth(pulled: PulledCase) -> None:
     seen = with_gaps(pulled, 3)
     model = reduced_model(pulled.system, seen, DT, 3, LoadDoubt(0.1, 1.0), seen.sd**2).model
-    covariance, when = dense_covariance(model), schedule(timetable(seen, DT))
+    covariance, when = dense_covariance(model), schedule(seen.timetable(DT))
     claims, known = Claims(covariance, when, 0.0), [covariance.start().P]
     claim = covariance.start()
     for k in range(1, 30):
@@ -382,7 +382,7 @@ def test_the_steady_claim_is_where_the_sequence_settles(pulled: PulledCase) -> N
             g = kf_predict(g, m.F, m.Q)
             if k % every == 0:
                 before, g = g, kf_update(g, np.zeros(3), m.H, m.R).posterior
-        P = steady(dense_covariance(m), schedule(timetable(seen, DT))).prior.P
+        P = steady(dense_covariance(m), schedule(seen.timetable(DT))).prior.P
         assert pytest.approx(m.H @ before.P @ m.H.T, rel=1e-5) == m.H @ P @ m.H.T
 
 

@@ -10,9 +10,9 @@ from scipy import sparse
 from validate.errors import ComparisonError, SceneError
 from validate.estimate.kalman.displacement_filter import load_shapes
 from validate.estimate.kalman.formulas import best_gain, innovation
-from validate.estimate.measurements import Measurements, on_steps, timetable
+from validate.estimate.measurements import Measurements, on_steps
 from validate.estimate.reduced.load_scale import LoadScale
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import build
 from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
@@ -23,7 +23,7 @@ from validate.testing.pulled_cube import DT, PAPER, case, cube
 def test_measurements_land_on_the_nearest_step() -> None:
     seen = case().measured(1, every=5)
     jittered = replace(seen, t=seen.t + 0.009 * DT * np.array([1, -1] * 6))
-    table = timetable(jittered, DT)
+    table = jittered.timetable(DT)
     assert sorted(table.z) == list(range(5, 61, 5))
     assert table.at(6) is None
     assert np.array_equal(table.z[10], seen.z[1])
@@ -33,7 +33,7 @@ def test_rows_without_a_value_and_rest_are_left_out() -> None:
     seen = case().measured(1, every=5)
     z = seen.z.copy()
     z[2], z[3, 1] = np.nan, np.nan
-    table = timetable(replace(seen, z=z, t=seen.t - seen.t[0]), DT)
+    table = replace(seen, z=z, t=seen.t - seen.t[0]).timetable(DT)
     assert table.at_rest == 1
     assert 0 not in table.z
     assert 10 not in table.z
@@ -43,11 +43,11 @@ def test_rows_without_a_value_and_rest_are_left_out() -> None:
 def test_a_step_that_does_not_meet_the_times_is_refused_with_one_that_does() -> None:
     seen = case().measured(1, every=5)
     with pytest.raises(ComparisonError, match=r"0\.33 steps of 0\.003 s.*dt = 0\.0025 s"):
-        timetable(seen, 0.003)
-    assert len(timetable(seen, 0.0025).z) == 12
+        seen.timetable(0.003)
+    assert len(seen.timetable(0.0025).z) == 12
     irregular = replace(seen, t=np.sort(np.random.default_rng(0).uniform(0.01, 1, 12)))
     with pytest.raises(ComparisonError, match="no step matches all of them"):
-        timetable(irregular, DT)
+        irregular.timetable(DT)
 
 
 def test_two_measurements_in_a_step_are_refused() -> None:
@@ -56,7 +56,7 @@ def test_two_measurements_in_a_step_are_refused() -> None:
         ComparisonError,
         match=r"60 measurements.*1 steps of 0\.01 s",
     ):
-        timetable(replace(seen, t=0.01 + 1e-6 * np.arange(60)), 0.01)
+        replace(seen, t=0.01 + 1e-6 * np.arange(60)).timetable(0.01)
 
 
 def test_jittered_looks_are_interpolated_and_their_error_counted() -> None:
@@ -75,7 +75,7 @@ def test_jittered_looks_are_interpolated_and_their_error_counted() -> None:
     assert sd[1] == pytest.approx(np.sqrt(1e-12 + (off**2).mean()), rel=1e-6)
     assert np.isnan(found[s > 0.5, 2]).all()
     H = sparse.csr_array(sparse.eye_array(3))
-    assert len(timetable(Measurements(s, H, found, sd, ("a", "b", "c")), 0.01).z) >= 30
+    assert len(Measurements(s, H, found, sd, ("a", "b", "c")).timetable(0.01).z) >= 30
 
 
 def test_a_jittering_camera_is_taken() -> None:
@@ -86,7 +86,7 @@ def test_a_jittering_camera_is_taken() -> None:
     late = markers.t + np.random.default_rng(2).uniform(0.0, 0.02, 12)
     jittered = replace(even, observations=(*even.drives, replace(markers, t=late)))
     found = Measurements.taken(jittered, case().system.scene.mesh)
-    assert len(timetable(found, 0.1).z) >= 10
+    assert len(found.timetable(0.1).z) >= 10
     assert (found.sd > 2e-5).all()
 
 
@@ -102,7 +102,7 @@ def observed(names: tuple[str, ...], points: np.ndarray, x: np.ndarray) -> Regis
     """Markers at `points` of the small cube, seen at `x` (nt, k, 3), without a registration."""
     mesh = case().system.scene.mesh
     t = 0.1 * np.arange(len(x))
-    rows = barycentric_rows(mesh, points)
+    rows = Rows.barycentric(mesh, points)
     fit: Any = None
     tre = np.zeros(len(names))
     markers = MarkerObservation("seen", "validates", t, names, x, points, rows, 2e-5, tre, fit)

@@ -16,7 +16,7 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.reader import digest
 from validate.recording.types import Recording
-from validate.register.markers.markers import placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.scene.geometries.specification import Cone, quarter_cone
 from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.solve.static.newton import StaticNewton
@@ -50,7 +50,7 @@ def quiet() -> Recording:
 
 
 def displacement(recording: Recording, name: str) -> Floats:
-    seen = placed_markers(recording, MESH)
+    seen = MarkerObservation.placed(recording, MESH)
     j = seen.names.index(name)
     return np.asarray(seen.x[:, j] - seen.rest[j])
 
@@ -155,7 +155,7 @@ def test_it_survives_a_file_and_is_placed_on_the_shipped_mesh(
     write_recording(twin, tmp_path / "x.mcap")
     read = read_recording(tmp_path / "x.mcap")
     assert digest(read) == digest(twin)
-    seen = placed_markers(read, MESH)
+    seen = MarkerObservation.placed(read, MESH)
     assert seen.positions.outside.max() < 1e-9  # every marker is on a node
     assert seen.positions.weights.max(axis=1).toarray() == pytest.approx(np.ones(8))
     assert float(seen.tre.max()) < 2e-5
@@ -174,7 +174,7 @@ def test_markers_turned_by_a_quarter_are_found(twin: Recording) -> None:
     names = tuple({**turned, "base3": "base1"}.get(n, n) for n in markers.names)
     spoilt = replace(twin, markers={"markers": replace(markers, names=names)})
     with pytest.raises(RegistrationError, match="permuted"):
-        placed_markers(spoilt, MESH)
+        MarkerObservation.placed(spoilt, MESH)
 
 
 def test_what_cannot_be_reached_is_refused() -> None:

@@ -9,7 +9,6 @@ from experiments.ekf_cube.locking import locking_factor
 from validate.errors import SceneError
 from validate.scene.geometries.box import box, centroids, grid
 from validate.scene.material import Material, Region
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Probe, Scene, Support
 
 MESH = box((0.1, 0.1, 0.1), (3, 3, 3))
@@ -59,7 +58,7 @@ def test_the_law_the_spread_and_regions_of_the_same_stuff_change_nothing() -> No
 
 def test_what_it_cannot_judge_is_refused() -> None:
     scene = bonded(0.3)
-    for bad in (replace(scene, body=quadratic(MESH)), replace(scene, loads=()),
+    for bad in (replace(scene, body=MESH.quadratic()), replace(scene, loads=()),
                 replace(scene, probes=())):  # fmt: skip
         with pytest.raises(SceneError, match="locking at 'top': needs linear cells"):
             locking_factor(bad, "top")

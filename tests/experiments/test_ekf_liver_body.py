@@ -20,7 +20,7 @@ from validate.fem.critical import cell_altitudes, critical_step
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.scene import Scene
 
 NOTHING = str(Path(__file__).parent / "nowhere")
@@ -44,7 +44,7 @@ def scene_of(mesh: Mesh) -> Scene:
 def test_the_generated_body_is_a_liver_in_size_and_has_sound_cells() -> None:
     """One closed body of 1 to 2 litres; the worst cell's altitude is a tenth of the mean edge."""
     mesh = generated_liver()
-    volumes = cell_volumes(mesh)
+    volumes = mesh.cell_volumes()
     assert 900 < len(mesh.nodes) < 1200
     assert 1e-3 < volumes.sum() < 2e-3
     assert volumes.min() > 0.15 * volumes.mean()
@@ -61,7 +61,7 @@ def test_the_generated_body_is_made_by_formulas_alone() -> None:
     one, two = generated_liver(), generated_liver()
     assert np.array_equal(one.nodes, two.nodes)
     assert np.array_equal(one.cells, two.cells)
-    sizes = [cell_volumes(generated_liver((6 * n, 4 * n, 3 * n))).sum() for n in (1, 2, 4)]
+    sizes = [generated_liver((6 * n, 4 * n, 3 * n)).cell_volumes().sum() for n in (1, 2, 4)]
     order = np.log2((sizes[1] - sizes[0]) / (sizes[2] - sizes[1]))
     assert order == pytest.approx(2.0, abs=0.1)
 

@@ -25,7 +25,6 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.pipeline import compare
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene, Support
 
@@ -88,7 +87,7 @@ def test_a_small_deep_contact_beside_the_indenter_does_not_draw_the_axis() -> No
 
 @pytest.mark.parametrize("nu", [0.2, 0.45])
 def test_the_ratio_that_moved_a_box_is_found_in_it(nu: float) -> None:
-    mesh = quadratic(grid((1.0, 1.0, 0.5), (2, 2, 2)))
+    mesh = grid((1.0, 1.0, 0.5), (2, 2, 2)).quadratic()
     rng = np.random.default_rng(5)
     held = nodes_of(mesh, FACES)
     moved = [1e-2 * rng.standard_normal((len(held), 3))]

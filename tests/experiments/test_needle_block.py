@@ -9,7 +9,7 @@ from validate.pipeline import load, run_in_memory
 from validate.pipeline.bodies.own_body import own_body
 from validate.pipeline.experiment.experiment import Experiment
 from validate.recording.types import Markers
-from validate.register.markers.markers import MarkerObservation, observe_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.scene.geometries.box import grid
 
 
@@ -63,7 +63,7 @@ def test_a_marker_outside_a_plane_mesh_is_refused() -> None:
     layout = dict(zip(names, rest, strict=True))
     up = (np.array([0.0, 0.0, 1.0]),) * 2
     with pytest.raises(RegistrationError, match="outside"):
-        observe_markers(
+        MarkerObservation.of(
             markers, layout, grid((1.0, 1.0), (2, 2)),
             up=up,
         )  # fmt: skip

@@ -19,7 +19,7 @@ from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 
 NAME = "needle_pocket"
 twin_module, loops, pocket = (beside(NAME, module) for module in ("twin", "loops", "pocket"))
@@ -215,7 +215,7 @@ def test_the_cube_is_drawn_cut_at_the_needle_and_turned_up() -> None:
     assert len(shown.cells) < 0.6 * len(mesh.cells)
     assert u == pytest.approx(np.tile([0.0, 0.0, 1e-3], (len(u), 1)))
     assert shown.nodes[:, 2].max() == pytest.approx(0, abs=1e-12)  # y = 0 is on top
-    assert cell_volumes(shown).min() > 0
+    assert shown.cell_volumes().min() > 0
     same, v = half(block(), np.zeros_like(block().nodes), 0.0)
     assert same is block()
     assert v.shape == block().nodes.shape

@@ -30,7 +30,7 @@ from validate.fem.assembly.assemble import (
 )
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, kuhn_cells, quadratic
+from validate.scene.mesh import Mesh, kuhn_cells
 from validate.scene.scene import Dilatation, Scene
 from validate.scene.shape_functions import EDGES
 
@@ -48,7 +48,7 @@ def distorted(cells: int, order: int, seed: int = 3) -> Mesh:
     inner = ((mesh.nodes > 0) & (mesh.nodes < 1)).all(axis=1)
     shift = np.random.default_rng(seed).uniform(-0.15, 0.15, mesh.nodes.shape) / cells
     moved = Mesh(mesh.nodes + shift * inner[:, None], mesh.cells, "tet4")
-    return quadratic(moved) if order == 2 else moved
+    return moved.quadratic() if order == 2 else moved
 
 
 def inner_unknowns(mesh: Mesh) -> np.ndarray:
@@ -73,7 +73,7 @@ def solve_with_edge_values(K: sparse.csr_array, mesh: Mesh, exact: np.ndarray) -
 )
 def test_the_stiffness_of_simplices_is_scikit_fems(size: tuple[float, ...], element: type) -> None:
     mesh = box(size, (2, 3, 2)[: len(size)])
-    mesh = quadratic(mesh) if element.__name__.endswith("P2") else mesh
+    mesh = mesh.quadratic() if element.__name__.endswith("P2") else mesh
     basis = Basis(library_mesh(mesh), ElementVector(element()), intorder=2)
     theirs = asm(linear_elasticity(*lame_parameters(2.0, 0.3)), basis)
     ours = stiffness(Scene(mesh, Material(2.0, 0.3)))
@@ -172,7 +172,7 @@ def l2_error(mesh: Mesh, u: np.ndarray, nu: float) -> float:
         N = L if mesh.order == 1 else np.concatenate([L * (2 * L - 1), 4 * L[i] * L[j]])
         place = np.einsum("a,ead->ed", L, mesh.nodes[mesh.corners])
         off = np.einsum("a,ead->ed", N, u[mesh.cells]) - exact_field(place, nu)
-        total += wa * wb * wc * (1 - a) ** 2 * (1 - b) * (6 * cell_volumes(mesh) @ (off**2).sum(1))
+        total += wa * wb * wc * (1 - a) ** 2 * (1 - b) * (6 * mesh.cell_volumes() @ (off**2).sum(1))
     return float(np.sqrt(total))
 
 

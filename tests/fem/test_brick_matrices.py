@@ -28,7 +28,7 @@ from validate.fem.assembly.assemble import (
     stiffness,
     stiffness_damping,
 )
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
@@ -191,7 +191,7 @@ def test_points_in_distorted_bricks_are_found(
     mesh = distorted(size, cells)
     rng = np.random.default_rng(5)
     points = rng.random((400, len(size))) * np.array(size)
-    rows = barycentric_rows(mesh, points)
+    rows = Rows.barycentric(mesh, points)
     assert rows.apply(mesh.nodes) == pytest.approx(points, abs=1e-14)
     assert rows.outside.max() < 1e-14
     assert rows.weights.sum(axis=1) == pytest.approx(np.ones(400))
@@ -203,7 +203,7 @@ def test_points_outside_are_read_at_their_feet(
 ) -> None:
     mesh, reach = grid(size, cells), np.array(size)
     points = np.random.default_rng(6).uniform(-0.2, 1.2, (300, len(size))) * reach
-    rows = barycentric_rows(mesh, points)
+    rows = Rows.barycentric(mesh, points)
     feet: Floats = np.clip(points, 0, reach)
     assert rows.apply(mesh.nodes) == pytest.approx(feet, abs=1e-14)
     assert rows.outside == pytest.approx(np.linalg.norm(points - feet, axis=1), abs=1e-14)

@@ -6,7 +6,7 @@ import pytest
 from validate.fem.assembly.cell_fields import cell_fields
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
 E, NU = 3e4, 0.3
@@ -16,7 +16,7 @@ LAM, MU = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
 def body(kind: str, law: str) -> Scene:
     bricks = grid((0.1, 0.2, 0.3), (1, 2, 2))
     linear = Mesh(bricks.nodes, bricks.simplices, "tet4")
-    mesh = {"tet4": linear, "tet10": quadratic(linear), "hex8": bricks}[kind]
+    mesh = {"tet4": linear, "tet10": linear.quadratic(), "hex8": bricks}[kind]
     return Scene(mesh, Material(E, NU, law=law))  # type: ignore[arg-type]
 
 

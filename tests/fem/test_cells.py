@@ -7,18 +7,18 @@ from field_oracles import nodal_volumes
 from validate.fem.assembly.assemble import jacobians, mass, nodal_rule, rule, values_at, volumes_at
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
 PLANE, SOLID = ((1.0, 0.8), (3, 2)), ((1.0, 0.8, 0.6), (2, 2, 1))
 MESHES = {
     "tri3": box(*PLANE),
-    "tri6": quadratic(box(*PLANE)),
+    "tri6": box(*PLANE).quadratic(),
     "quad4": grid(*PLANE),
     "tet4": box(*SOLID),
-    "tet10": quadratic(box(*SOLID)),
+    "tet10": box(*SOLID).quadratic(),
     "hex8": grid(*SOLID),
-    "hex27": quadratic(grid(*SOLID)),
+    "hex27": grid(*SOLID).quadratic(),
 }
 
 
@@ -33,8 +33,8 @@ def test_shapes_are_one_at_their_own_node(mesh: Mesh) -> None:
 
 def test_volumes_and_nodal_shares_sum_to_the_body(mesh: Mesh) -> None:
     per_cell = volumes_at(mesh, rule(mesh, 2)).sum(axis=1)
-    assert per_cell == pytest.approx(cell_volumes(mesh), rel=1e-13)
-    assert nodal_volumes(mesh).sum() == pytest.approx(cell_volumes(mesh).sum(), rel=1e-13)
+    assert per_cell == pytest.approx(mesh.cell_volumes(), rel=1e-13)
+    assert nodal_volumes(mesh).sum() == pytest.approx(mesh.cell_volumes().sum(), rel=1e-13)
 
 
 def test_nodal_shares_are_the_row_sums_of_the_library_mass(mesh: Mesh) -> None:

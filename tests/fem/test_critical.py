@@ -21,7 +21,7 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material, Region
-from validate.scene.mesh import Mesh, boundary_facets, quadratic
+from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.scene import Scene, Support
 
 # private: _density, _require: called alone, case by case.
@@ -32,7 +32,7 @@ HELD = (Support("z0", (0, 1, 2)),)
 
 def block(n: int = 3, order: int = 1) -> System:
     mesh = box((0.1, 0.1, 0.1), (n, n, n))
-    return build(Scene(quadratic(mesh) if order == 2 else mesh, GEL, HELD))
+    return build(Scene(mesh.quadratic() if order == 2 else mesh, GEL, HELD))
 
 
 def exact_limit(system: System) -> float:

@@ -16,8 +16,7 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material, Region
-from validate.scene.mesh import Mesh, quadratic
-from validate.scene.rubber import ogden
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Scene
 
 STRETCH = np.array([[0.2, 0.3, 0.0], [-0.2, -0.3, 0.1], [0.1, 0.0, 0.4]])
@@ -237,7 +236,7 @@ def test_principal_directions_of_equal_and_small_eigenvalues() -> None:
 def test_terms_of_regions_may_differ_in_number() -> None:
     """A cell of two terms beside cells of three: the card is filled up with none."""
     whole = scene("ogden")
-    two = replace(ogden((4e3, 1e3), (2.0, 3.0), 0.45), rho=1000.0)
+    two = replace(Material.ogden((4e3, 1e3), (2.0, 3.0), 0.45), rho=1000.0)
     mixed = replace(whole, regions=(Region("other", np.arange(100, 250), two),))
     u, rest = deformed(whole.mesh), np.setdiff1d(np.arange(360), np.arange(100, 250))
     parts = [(rest, whole.material), (np.arange(100, 250), two)]
@@ -253,7 +252,7 @@ def test_what_has_no_explicit_form_is_refused() -> None:
     with pytest.raises(SceneError, match="0 threads: use 1"):
         ExplicitBody(body, threads=0)
     with pytest.raises(SceneError, match="tet10 have no explicit form"):
-        ExplicitBody(replace(body, body=quadratic(body.mesh)))
+        ExplicitBody(replace(body, body=body.mesh.quadratic()))
     with pytest.raises(SceneError, match="law 'linear' has no large-strain form"):
         ExplicitBody(replace(body, material=Material(30e3, 0.3)))
     with pytest.raises(SceneError, match="use 'pointwise'"):

@@ -14,7 +14,6 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material, Region
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.explicit.central import CentralDifference
@@ -117,6 +116,6 @@ def test_what_has_no_explicit_form_is_refused() -> None:
     with pytest.raises(SceneError, match=r"laws neo_hooke.*'svk' \(split\)"):
         ExplicitBody(replace(scene, material=sample("svk"), regions=()))
     with pytest.raises(SceneError, match="hex27 have no explicit form"):
-        ExplicitBody(replace(scene, body=quadratic(grid((1.0,) * 3, (3, 2, 2))), regions=()))
+        ExplicitBody(replace(scene, body=grid((1.0,) * 3, (3, 2, 2)).quadratic(), regions=()))
     with pytest.raises(SceneError, match="node filters support tetrahedra"):
         ExplicitBody(scene).force_and_blocks(np.zeros(scene.mesh.nodes.size))

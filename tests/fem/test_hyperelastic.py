@@ -15,7 +15,7 @@ from validate.fem.cavity import cavity_surface, volume_hessian
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import NeoHooke, SaintVenantKirchhoff, law_of
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Dilatation, Foundation, Membrane, Scene
 
 MATERIAL = Material(15_200.0, 0.485)
@@ -146,7 +146,7 @@ def _disordered(mesh: Mesh, rng: np.random.Generator) -> Mesh:
     inner = ((nodes > 0) & (nodes < 1)).all(axis=1)
     nodes[inner] += 0.05 * rng.uniform(-1, 1, (int(inner.sum()), 3))
     linear = Mesh(nodes, mesh.corners, "tet4", {})
-    return quadratic(linear) if mesh.order == 2 else linear
+    return linear.quadratic() if mesh.order == 2 else linear
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])

@@ -11,7 +11,7 @@ from validate.arrays import Floats
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import Law, law_of
 from validate.fem.linear_solvers.factor import elimination_order, factorise_indefinite
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Dilatation, Scene
 from validate.scene.shape_functions import EDGES
 
@@ -52,7 +52,7 @@ def shapes(order: int) -> Floats:
 def points(mesh: Mesh) -> tuple[Floats, Floats]:
     """Places (e, q, 3) and weights (e, q) of the fine quadrature."""
     x = np.einsum("qa,ead->eqd", BARYCENTRIC, mesh.nodes[mesh.corners])
-    return x, cell_volumes(mesh)[:, None] * WEIGHTS
+    return x, mesh.cell_volumes()[:, None] * WEIGHTS
 
 
 def load(mesh: Mesh, law: Law) -> Floats:

@@ -14,7 +14,7 @@ from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.laws import Coefficients
 from validate.scene.material import LawName, Material, Region
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
@@ -32,7 +32,7 @@ every = pytest.mark.parametrize("kind", KINDS)
 
 def made(kind: str, size: tuple[float, ...], cells: tuple[int, ...]) -> Mesh:
     mesh = box(size, cells) if kind in ("tet10", "tri6") else grid(size, cells)
-    return mesh if kind in ("hex8", "quad4") else quadratic(mesh)
+    return mesh if kind in ("hex8", "quad4") else mesh.quadratic()
 
 
 def rollers(d: int = 3) -> tuple[Support, ...]:
@@ -245,7 +245,7 @@ def test_taylor_hood_elements_agree_within_the_mesh() -> None:
         base = Scene(mesh, Material(E, 0.5), (Support("z0", (0, 1, 2)),), dilatation="mixed",
                      loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),))  # fmt: skip
         theirs.append(mixed_static(base).compliances[0])
-        system = build(replace(base, body=quadratic(mesh)))
+        system = build(replace(base, body=mesh.quadratic()))
         stepper = QuasiStatic().prepare(system)
         u = stepper.field(stepper.step(stepper.rest(), np.array([1.0]))).ravel()
         ours.append(float(system.loads[:, 0] @ u))

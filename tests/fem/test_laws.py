@@ -14,7 +14,6 @@ from validate.fem.laws.plane_stress import response
 from validate.scene.laws import LAWS, Coefficients, VolumetricName, ogden_terms
 from validate.scene.material import LawName, Material
 from validate.scene.meshless import MaterialPoint, StretchMode
-from validate.scene.rubber import mooney_rivlin, ogden, yeoh
 from validate.testing.laws import law_contract, rotation
 
 every = pytest.mark.parametrize("name", NAMES)
@@ -45,11 +44,11 @@ def test_equal_stretches_are_no_special_case(form: VolumetricName, gap: float) -
     stretches."""
     mu, nu = 5_000.0, 0.45
     if form == "split":
-        mine = law_of(ogden((0.76 * mu, -0.24 * mu), (2.0, -2.0), nu))
-        other = law_of(mooney_rivlin(0.38 * mu, 0.12 * mu, nu))
+        mine = law_of(Material.ogden((0.76 * mu, -0.24 * mu), (2.0, -2.0), nu))
+        other = law_of(Material.mooney_rivlin(0.38 * mu, 0.12 * mu, nu))
     else:
-        mine = law_of(ogden((0.6 * mu, 0.4 * mu), (2.0, 2.0), nu, form))
-        other = law_of(mooney_rivlin(mu / 2, 0.0, nu, form))
+        mine = law_of(Material.ogden((0.6 * mu, 0.4 * mu), (2.0, 2.0), nu, form))
+        other = law_of(Material.mooney_rivlin(mu / 2, 0.0, nu, form))
     for stretches in ([1.3, 1.3 + gap, 0.8], [1.2, 1.2 + gap, 1.2 - gap], [1.0, 1.0 + gap, 1.0]):
         H = turned(1) @ np.diag(stretches) @ turned(2) - EYE
         assert mine.stress(H) == pytest.approx(other.stress(H), abs=1e-13 * other.kappa)
@@ -69,12 +68,14 @@ def test_the_tangent_of_three_terms_at_equal_stretches(name: str) -> None:
 
 def test_published_coefficients_are_what_they_are() -> None:
     """Treloar's rubber by Ogden (1972): mu .63, .0012, -.01 MPa, alpha 1.3, 5, -2: mu .4225 MPa."""
-    treloar = ogden((0.63e6, 0.0012e6, -0.01e6), (1.3, 5.0, -2.0), 0.4995, stretches=(0.2, 7.0))
+    treloar = Material.ogden(
+        (0.63e6, 0.0012e6, -0.01e6), (1.3, 5.0, -2.0), 0.4995, stretches=(0.2, 7.0)
+    )
     assert treloar.shear_modulus == pytest.approx(0.4225e6, rel=1e-12)
     terms = ogden_terms(treloar.coefficients, treloar.shear_modulus)
     assert np.ravel(terms) == pytest.approx([0.63e6, 1.3, 0.0012e6, 5.0, -0.01e6, -2.0], rel=1e-12)
-    assert law_of(mooney_rivlin(3e3, 1e3, 0.4)).mu == pytest.approx(8e3)
-    assert law_of(yeoh(3e3, 100.0, 5.0, 0.4, rho=1000.0)).mu == pytest.approx(6e3)
+    assert law_of(Material.mooney_rivlin(3e3, 1e3, 0.4)).mu == pytest.approx(8e3)
+    assert law_of(Material.yeoh(3e3, 100.0, 5.0, 0.4, rho=1000.0)).mu == pytest.approx(6e3)
 
 
 # Closed forms in the incompressible limit: P = (l - l^p) times a factor of the law.

@@ -6,16 +6,15 @@ from phantoms import CAPSULE, COARSE_GRID, grid_mesh, phantom_mesh
 
 from validate.errors import RegistrationError
 from validate.fem.assembly.locate import (
-    barycentric_rows,
+    Rows,
     facet_samples,
     nearest_node_rows,
     nearest_on_surface,
     probe_rows,
     require_inside,
-    standing_rows,
 )
 from validate.scene.geometries.box import box
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe
 
 orders = pytest.mark.parametrize("order", [1, 2])
@@ -39,7 +38,7 @@ def inside(mesh: Mesh, k: int) -> np.ndarray:
 def test_polynomials_of_the_mesh_order_are_read_exactly(order: int) -> None:
     mesh = phantom_mesh(COARSE_GRID, order)
     points = inside(mesh, 300)
-    rows = barycentric_rows(mesh, points)
+    rows = Rows.barycentric(mesh, points)
     assert rows.apply(field(mesh.nodes, order)) == pytest.approx(field(points, order), abs=1e-13)
     assert rows.outside.max() < 1e-15
     assert rows.weights.sum(axis=1) == pytest.approx(1.0, abs=1e-13)
@@ -50,14 +49,14 @@ def test_polynomials_of_the_mesh_order_are_read_exactly(order: int) -> None:
 def test_nodes_read_themselves(order: int) -> None:
     mesh = phantom_mesh(COARSE_GRID, order)
     values = np.random.default_rng(0).normal(size=(len(mesh.nodes), 3))
-    assert barycentric_rows(mesh, mesh.nodes).apply(values) == pytest.approx(values, abs=1e-10)
+    assert Rows.barycentric(mesh, mesh.nodes).apply(values) == pytest.approx(values, abs=1e-10)
     assert nearest_node_rows(mesh, mesh.nodes).apply(values) == pytest.approx(values, abs=0)
 
 
 def test_point_outside_is_clipped_measured_and_named() -> None:
     mesh = grid_mesh((3, 3, 3))
     points = np.array([[0.3, 0.4, 0.2], [0.3, 0.4, 1.25]])
-    rows = barycentric_rows(mesh, points)
+    rows = Rows.barycentric(mesh, points)
     assert rows.outside[0] < 1e-15
     # The clipped foot lies in the nearest cell, at most a little beside the nearest point.
     assert 0.25 <= rows.outside[1] < 0.5
@@ -103,7 +102,7 @@ def test_a_marker_on_a_stalk_is_turned_with_the_surface(order: int) -> None:
     """A rigid motion by 20 degrees moves a point 6 mm off the face exactly, as if it were the
     body's; a point inside is read as ever."""
     mesh = box((0.1, 0.03, 0.03), (4, 2, 2))
-    mesh = quadratic(mesh) if order == 2 else mesh
+    mesh = mesh.quadratic() if order == 2 else mesh
     points = np.array([[0.1, 0.015, 0.036], [0.04, -0.006, 0.01], [0.05, 0.01, 0.02]])
     probes = [Probe(str(i), tuple(p.tolist()), stands=i < 2) for i, p in enumerate(points)]
     rows = probe_rows(mesh, probes)
@@ -113,7 +112,7 @@ def test_a_marker_on_a_stalk_is_turned_with_the_surface(order: int) -> None:
     assert rows.outside[2] == 0
     assert ((rows.outside[:2] >= 0.006 - 1e-12) & (rows.outside[:2] < 0.009)).all()
     u = np.random.default_rng(1).normal(size=mesh.nodes.shape)
-    assert np.allclose(rows.apply(u)[2], barycentric_rows(mesh, points).apply(u)[2])
+    assert np.allclose(rows.apply(u)[2], Rows.barycentric(mesh, points).apply(u)[2])
 
 
 def test_the_foot_of_a_marker_on_a_stalk_is_the_nearest_point_of_the_surface() -> None:
@@ -123,7 +122,7 @@ def test_the_foot_of_a_marker_on_a_stalk_is_the_nearest_point_of_the_surface() -
     points = rng.uniform(-0.02, 0.05, (200, 3)) + np.array([0.03, 0.0, 0.0])
     nearest = np.clip(points, 0, [0.1, 0.03, 0.03])
     out = np.linalg.norm(points - nearest, axis=1)
-    rows = standing_rows(mesh, points)
+    rows = Rows.standing(mesh, points)
     assert rows.outside == pytest.approx(out, abs=1e-12)
     outside = points[out > 0]
     assert nearest_on_surface(mesh, outside) == pytest.approx(nearest[out > 0], abs=1e-12)

@@ -13,7 +13,7 @@ from validate.fem.locking import locking_notes
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Material, Region
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Scene, Support, Weight
 
 SOFT = Material(1e4, 0.3, rho=1000.0, mass_damping=2.0, stiffness_damping=0.1)
@@ -24,7 +24,7 @@ UP = {2: (0.0, 1.0), 3: (0.0, 0.0, 1.0)}
 
 def block(order: int = 1, d: int = 3) -> Mesh:
     mesh = box(SIZE[:d], (3, 2, 2)[:d])
-    return quadratic(mesh) if order == 2 else mesh
+    return mesh.quadratic() if order == 2 else mesh
 
 
 def top(mesh: Mesh) -> str:
@@ -73,7 +73,7 @@ def test_a_linear_cells_mass_is_exact() -> None:
 def test_a_quadratic_cells_mass_is_exact() -> None:
     """Functions L(2L - 1) and 4 L_a L_b by the integrals of monomials; HRZ of those."""
     corners = np.vstack([np.zeros(3), np.diag(SIZE)])
-    mesh = quadratic(Mesh(corners, np.array([[0, 1, 2, 3]]), "tet4", {}))
+    mesh = Mesh(corners, np.array([[0, 1, 2, 3]]), "tet4", {}).quadratic()
     V = float(np.prod(SIZE)) / 6
     shapes = []
     for node in mesh.nodes:
@@ -208,7 +208,7 @@ def cube(order: int = 1, spread: str = "consistent") -> System:
     mesh = box((0.004, 0.004, 0.007), (4, 4, 7))
     return build(
         Scene(
-            quadratic(mesh) if order == 2 else mesh,
+            mesh.quadratic() if order == 2 else mesh,
             Material(1e4, 0.47, rho=1068.0, stiffness_damping=0.1),
             (Support("z0", (0, 1, 2)),),
             loads=(Load("pull", "z1", (0.0, 0.0, 1.0), spread),),  # type: ignore[arg-type]
@@ -266,7 +266,7 @@ def test_few_linear_cells_across_a_slender_body_are_warned_of(
     across: int, order: int, warned: bool
 ) -> None:
     rod = box((0.1, 0.02, 0.02), (5 * across, across, across))
-    scene = Scene(quadratic(rod) if order == 2 else rod, Material(1e4, 0.3))
+    scene = Scene(rod.quadratic() if order == 2 else rod, Material(1e4, 0.3))
     assert ("locks in bending" in " ".join(locking_notes([("fem", scene)]))) == warned
 
 

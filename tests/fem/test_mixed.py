@@ -15,7 +15,7 @@ from validate.fem.locking import locking_notes
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Load, Mass, Membrane, Pin, Scene, Support
 
 # private: _require_plain: called alone, case by case.
@@ -79,7 +79,7 @@ def test_far_from_incompressible_it_agrees_with_quadratic_elements() -> None:
         box((2.0, 1.0), (12, 6)), material, supports, loads=(Load("q", "x1", (0.0, 1.0)),)
     )
     mixed = mixed_static(scene).compliances[0]
-    assert compliance(replace(scene, body=quadratic(scene.mesh))) == pytest.approx(mixed, rel=2e-3)
+    assert compliance(replace(scene, body=scene.mesh.quadratic())) == pytest.approx(mixed, rel=2e-3)
     assert compliance(scene) < 0.97 * mixed
 
 

@@ -23,7 +23,7 @@ from validate.fem.laws.law import law_of
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName, Material, Region
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Dilatation, Load, Scene, Support
 
 SOFT = Material(15_200.0, 0.49)
@@ -35,7 +35,7 @@ laws = pytest.mark.parametrize("law", LAWS)
 
 def made(kind: str, size: tuple[float, ...], cells: tuple[int, ...]) -> Mesh:
     mesh = box(size, cells) if kind == "tet10" else grid(size, cells)
-    return mesh if kind in ("hex8", "tet4") else quadratic(mesh)
+    return mesh if kind in ("hex8", "tet4") else mesh.quadratic()
 
 
 @cache
@@ -45,7 +45,7 @@ def skewed(kind: str) -> Mesh:
     inner = ((mesh.nodes > 0) & (mesh.nodes < 1)).all(axis=1)
     nodes = mesh.nodes + 0.08 * np.sin(7 * mesh.nodes[:, ::-1]) * inner[:, None]
     moved = Mesh(nodes, mesh.cells, mesh.kind, mesh.facets)
-    return moved if kind == "hex8" else quadratic(moved)
+    return moved if kind == "hex8" else moved.quadratic()
 
 
 def mixed(kind: str, law: LawName, nu: float = 0.49) -> Scene:
@@ -182,7 +182,7 @@ def test_nothing_locks_at_nu_4999(kind: str, cells: tuple[int, ...], within: flo
     assert cantilever(kind, cells, 0.4999, "pointwise") < 0.87 * mixed
 
 
-@pytest.mark.parametrize("mesh", [grid((1.0, 1.0), (3, 3)), quadratic(box((1.0, 1.0), (2, 2)))])
+@pytest.mark.parametrize("mesh", [grid((1.0, 1.0), (3, 3)), box((1.0, 1.0), (2, 2)).quadratic()])
 def test_in_plane_strain_a_linear_field_is_exact_and_others_are_softer(mesh: Mesh) -> None:
     pointwise = Scene(mesh, SOFT, thickness=0.3)
     K, T = stiffness(pointwise), stiffness(replace(pointwise, dilatation="mixed"))

@@ -8,7 +8,7 @@ from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface
 from validate.fem.system import Responses, build
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.solve.fluid.pressure_curve import pressure_at_volume, tuned_gain
 
@@ -17,7 +17,7 @@ def block(n: int, order: int = 1) -> Responses:
     mesh = square_with_hole(0.05, 0.01, n)
     held = (Support("bottom", (0, 1)),)
     cavity = (Cavity("hole", "cavity"),)
-    made = mesh if order == 1 else quadratic(mesh)
+    made = mesh if order == 1 else mesh.quadratic()
     return Responses.of(build(Scene(made, Material(34e3, 0.35), held, cavities=cavity)))
 
 
@@ -50,7 +50,7 @@ def test_the_quadratic_slope_of_the_note() -> None:
 @pytest.mark.parametrize("order", [1, 2])
 def test_the_load_is_the_derivative_of_the_area(order: int) -> None:
     mesh = square_with_hole(0.05, 0.01, 10)
-    mesh = mesh if order == 1 else quadratic(mesh)
+    mesh = mesh if order == 1 else mesh.quadratic()
     surface = cavity_surface(mesh, "hole", "cavity")
     rng = np.random.default_rng(1)
     x = mesh.nodes + 1e-4 * rng.standard_normal(mesh.nodes.shape)

@@ -13,7 +13,7 @@ from validate.fem.assembly.assemble import stiffness
 from validate.fem.large_strain.hyperelastic import Body
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material, Prony
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Drive, PlaneState, Scene, Support
 from validate.solve.march import run_scheme
@@ -23,7 +23,7 @@ from validate.solve.static.stretch_test import StretchTest
 SIZE, THICKNESS = (0.03, 0.02), 0.002
 MESHES = {
     "tri3": box(SIZE, (3, 2)),
-    "tri6": quadratic(box(SIZE, (3, 2))),
+    "tri6": box(SIZE, (3, 2)).quadratic(),
     "quad4": grid(SIZE, (3, 2)),
 }
 every = pytest.mark.parametrize(

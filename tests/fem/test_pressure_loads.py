@@ -10,7 +10,6 @@ from validate.fem.assembly.assemble import load_columns
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.places import OnPlane, place_of
 from validate.scene.scene import Pressure, Scene, Support
 from validate.solve.static.quasi_static import QuasiStatic
@@ -19,7 +18,7 @@ SIZE = (0.03, 0.02, 0.01)
 SOFT = Material(20e3, 0.3)
 
 
-@pytest.mark.parametrize("mesh", [box(SIZE, (2, 2, 1)), quadratic(box(SIZE, (2, 1, 1))),
+@pytest.mark.parametrize("mesh", [box(SIZE, (2, 2, 1)), box(SIZE, (2, 1, 1)).quadratic(),
                                   grid(SIZE, (2, 2, 1))])  # fmt: skip
 def test_a_pascal_pushes_into_the_body(mesh: object) -> None:
     scene = Scene(mesh, SOFT, loads=(Pressure("p", "z1"),))  # type: ignore[arg-type]

@@ -9,7 +9,6 @@ from validate.fem.laws.law import law_of
 from validate.fem.laws.plane_stress import response
 from validate.scene.material import LawName, Material
 from validate.scene.meshless import MaterialPoint, StretchMode
-from validate.scene.rubber import mooney_rivlin, ogden
 
 E, NU = 12_000.0, 0.4
 STRETCHES = np.array([0.6, 0.8, 1.0, 1.2, 1.5])
@@ -99,7 +98,7 @@ def test_two_stretches_have_the_incompressible_stresses() -> None:
     """P1 = 2 (l1 - l3^2/l1) (C10 + C01 l2^2), P2 with the indices changed, l3 = 1/(l1 l2)."""
     pairs = np.array([[1.1, 1.0], [1.6, 1.18], [2.2, 0.82], [0.8, 1.3]])
     (l1, l2), C10, C01 = pairs.T, 12e3, 3e3
-    found = response(MaterialPoint(mooney_rivlin(C10, C01, 0.499999), "biaxial"), pairs)
+    found = response(MaterialPoint(Material.mooney_rivlin(C10, C01, 0.499999), "biaxial"), pairs)
     free = 1 / (l1 * l2)
     first = 2 * (l1 - free**2 / l1) * (C10 + C01 * l2**2)
     second = 2 * (l2 - free**2 / l2) * (C10 + C01 * l1**2)
@@ -132,6 +131,6 @@ def test_a_law_of_powers_is_its_closed_form_far_out(mode: StretchMode) -> None:
     """G (2/a) (l^(a-1) - l3^a/l): at stretch 7 the third direction is down to a fiftieth."""
     G, a, l = 2e5, 2.4946, np.array([0.5, 3.0, 5.0, 7.0])
     free = {"uniaxial": l**-0.5, "equibiaxial": l**-2, "pure_shear": 1 / l}[mode]
-    law = ogden((2 * G / a,), (a,), 0.4999999, stretches=(1e-2, 10.0))
+    law = Material.ogden((2 * G / a,), (a,), 0.4999999, stretches=(1e-2, 10.0))
     found = response(MaterialPoint(law, mode), l)["nominal_stress"]
     assert found == pytest.approx(2 * G / a * (l ** (a - 1) - free**a / l), rel=1e-4)

@@ -7,7 +7,7 @@ from phantoms import grid_mesh
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import foundation_stiffness, membrane_stiffness, stiffness
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Membrane, Scene
 
 LATEX = Material(1.2e6, 0.45)
@@ -16,7 +16,7 @@ LATEX = Material(1.2e6, 0.45)
 @pytest.fixture(params=[1, 2])
 def mesh(request: pytest.FixtureRequest) -> Mesh:
     flat = grid_mesh((3, 3, 4), (0.02, 0.03, 0.04))
-    return flat if request.param == 1 else quadratic(flat)
+    return flat if request.param == 1 else flat.quadratic()
 
 
 def energy(K: object, u: np.ndarray) -> float:

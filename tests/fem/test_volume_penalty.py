@@ -13,7 +13,7 @@ from validate.fem.assembly.volume_constraints import Normals, volume_penalty
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene, Support
 
 SOFT = Material(10e3, 0.3)
@@ -152,6 +152,6 @@ def test_what_has_no_such_penalty_is_refused() -> None:
     with pytest.raises(SceneError, match="thickness is free"):
         volume_penalty(replace(scene, plane="stress"), 1.0)
     with pytest.raises(SceneError, match="linear cells, not tri6"):
-        volume_penalty(replace(scene, body=quadratic(scene.mesh)), 1.0)
+        volume_penalty(replace(scene, body=scene.mesh.quadratic()), 1.0)
     with pytest.raises(SceneError, match="quad4 have no constant strain"):
         volume_penalty(replace(scene, body=grid((1.0, 1.0), (2, 2))), 1.0)

@@ -22,7 +22,7 @@ from validate.recording.merge import REPEATS, SHARE, repeats_share
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.tables.testing_machine import read_instron
 from validate.recording.types import Recording
-from validate.register.signals import validating
+from validate.register.signals import SignalObservation
 from validate.solve.fluid.cavities import NoFluid
 
 T = np.arange(60) / 10
@@ -73,7 +73,7 @@ def test_the_logs_stay_beside_as_they_were_and_survive_a_file(tmp_path: Path) ->
     assert repeats_share(again) == pytest.approx(0.1, rel=1e-4)
     assert float(again.record("specimen")["diameter_m"]) == pytest.approx(0.025)
     assert "mean of 2 logs of 2 specimens to 2.95 mm" in again.record(ASSUMED)["repeats"]
-    seen = validating(again, "force", "N", quantity="force", trace="stage.force")
+    seen = SignalObservation.validating(again, "force", "N", quantity="force", trace="stage.force")
     assert seen.share == repeats_share(again)  # u_D is that of the repeats
 
 

@@ -21,7 +21,7 @@ from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
-from validate.register.signals import driving, validating
+from validate.register.signals import SignalObservation
 from validate.scene.material import Material
 from validate.scene.meshless import MaterialPoint
 from validate.solve.static.stretch_test import StretchTest
@@ -54,8 +54,10 @@ def build(recording: Recording, tree: Tree, changes: Mapping[str, Any]) -> Mater
 
 
 def place(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
-    stress = validating(recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress")
-    return Registered((driving(recording, "stretch", "1"), stress), timed=False)
+    stress = SignalObservation.validating(
+        recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress"
+    )
+    return Registered((SignalObservation.driving(recording, "stretch", "1"), stress), timed=False)
 
 
 def calibration(method: str, low: float) -> Calibration:

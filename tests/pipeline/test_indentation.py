@@ -18,7 +18,7 @@ from validate.pipeline.ladder.default import body_of, trial_of
 from validate.recording.types import Recording, Signal, Source
 from validate.register.observation import EVERYTHING
 from validate.register.registration import Registered
-from validate.register.signals import driving, validating
+from validate.register.signals import SignalObservation
 from validate.report.write import write_report
 from validate.scene.contact import RigidContact, RigidSphere
 from validate.scene.geometries.specification import Box
@@ -39,8 +39,10 @@ SCENE = Scene(
 
 
 def felt(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    force = validating(recording, "force", "N", quantity="force.ball", trace="ball.force")
-    return Registered((driving(recording, "depth", "m"), force), (EVERYTHING,))
+    force = SignalObservation.validating(
+        recording, "force", "N", quantity="force.ball", trace="ball.force"
+    )
+    return Registered((SignalObservation.driving(recording, "depth", "m"), force), (EVERYTHING,))
 
 
 def pressed() -> Recording:

@@ -17,11 +17,10 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
-from validate.register.signals import driving, validating
+from validate.register.signals import SignalObservation
 from validate.report.write import write_report
 from validate.scene.material import Material, Prony
 from validate.scene.meshless import MaterialPoint
-from validate.scene.rubber import mooney_rivlin, ogden, yeoh
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.static.stretch_test import StretchTest
 
@@ -45,8 +44,10 @@ def recorded() -> Recording:
 
 
 def place(recording: Recording, tree: Tree, scene: object) -> Registered:
-    stress = validating(recording, "stress", "Pa", quantity="stress", trace="nominal_stress")
-    return Registered((driving(recording, "stretch", "1"), stress))
+    stress = SignalObservation.validating(
+        recording, "stress", "Pa", quantity="stress", trace="nominal_stress"
+    )
+    return Registered((SignalObservation.driving(recording, "stretch", "1"), stress))
 
 
 POINT = Experiment(
@@ -87,16 +88,16 @@ def held(stress: Floats, t: Floats, stretch: Floats) -> Recording:
 # Incompressible uniaxial tension: P of every law by its published coefficients.
 CURVES = {
     "mooney_rivlin": (
-        mooney_rivlin(12e3, 3e3, NU),
+        Material.mooney_rivlin(12e3, 3e3, NU),
         2 * (STRETCH - STRETCH**-2) * (12e3 + 3e3 / STRETCH),
     ),
     "yeoh": (
-        yeoh(15e3, 800.0, 100.0, NU),
+        Material.yeoh(15e3, 800.0, 100.0, NU),
         2 * (STRETCH - STRETCH**-2)
         * (15e3 + 1600.0 * (I1 := STRETCH**2 + 2 / STRETCH - 3) + 300.0 * I1**2),
     ),
     "ogden": (
-        ogden((20e3, 500.0), (1.3, 5.0), NU),
+        Material.ogden((20e3, 500.0), (1.3, 5.0), NU),
         20e3 * (STRETCH**0.3 - STRETCH**-1.65) + 500.0 * (STRETCH**4 - STRETCH**-3.5),
     ),
 }  # fmt: skip
@@ -152,8 +153,10 @@ def test_every_recording_of_one_material_has_its_own_mode() -> None:
 
     def by_mode(recording: Recording, tree: Tree, scene: MaterialPoint) -> Registered:
         assert scene.mode == recording.name
-        stress = validating(recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress")
-        return Registered((driving(recording, "stretch", "1"), stress))
+        stress = SignalObservation.validating(
+            recording, "stress", "Pa", quantity=scene.mode, trace="nominal_stress"
+        )
+        return Registered((SignalObservation.driving(recording, "stretch", "1"), stress))
 
     accept = tuple(Accept(mode, 9e3, "a tenth of the stress") for mode in powers)
     both = replace(

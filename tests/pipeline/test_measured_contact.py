@@ -31,7 +31,6 @@ from validate.scene.contact import (
 )
 from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.material import Material
-from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Load, Scene, Support
 
 SIZE, E, C = (0.04, 0.03, 0.02), 20e3, 4e-3
@@ -216,7 +215,7 @@ def test_a_quarter_has_the_force_of_the_whole(tmp_path: Path) -> None:
 
 def test_a_cylinder_specimen_has_its_volume() -> None:
     body = IndentedCylinder(0.02, 0.003, (12, 4), (0.3, 0.3))
-    volume = 4 * cell_volumes(body.resolved(Path())).sum()
+    volume = 4 * body.resolved(Path()).cell_volumes().sum()
     assert volume == pytest.approx(np.pi * 0.01**2 * 0.003, rel=0.01)
 
 

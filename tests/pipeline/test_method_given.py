@@ -17,7 +17,7 @@ from validate.pipeline.experiment.find import _executed, load_file
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.options import folder_of
 from validate.pipeline.ladder import default as ladder_default
-from validate.pipeline.ladder.ladder import turned
+from validate.pipeline.ladder.ladder import Turned
 from validate.pipeline.live import prepared as prepared_live
 from validate.pipeline.live.live_recording import as_given
 from validate.pipeline.plates import inclusion
@@ -135,7 +135,7 @@ def test_a_declared_step_gives_way_to_the_clocks() -> None:
             "x.unknown cannot be loaded as Python",
         ),
         (
-            lambda: turned(Material(1.0, 0.3), 4),
+            lambda: Turned.of(Material(1.0, 0.3), 4),
             SceneError,
             "a motion needs a density; set the material's rho, kg/m3",
         ),

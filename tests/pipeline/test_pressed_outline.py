@@ -26,7 +26,7 @@ from validate.register.observation import Selection
 from validate.register.outlines.outlines import OutlineObservation
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.scene.geometries.inclusion import Block, Capsule, block_with_inclusion
+from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.geometries.specification import MeshFile, whole_cylinder
 from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import write_mesh
@@ -169,7 +169,7 @@ def test_fluid_in_a_body_wants_its_modulus_and_the_linear_law() -> None:
 def cyst(path: Path) -> None:
     """A block pressed along z with a capsule along y in it."""
     shape = Capsule((0.02, 0.025, 0.018), 0.008, 0.03)
-    mesh = block_with_inclusion(Block(0.04, 0.05, 0.036), (9, 9, 9), shape)
+    mesh = Block(0.04, 0.05, 0.036).around((9, 9, 9), shape)
     named = {"lower_plate": "z0", "upper_plate": "z1", "wall": "cavity"}
     facets = {name: mesh.facets[old] for name, old in named.items()}
     write_mesh(replace(mesh, nodes=mesh.nodes - [0.02, 0.025, 0], facets=facets), path)

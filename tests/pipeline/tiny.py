@@ -19,10 +19,10 @@ from validate.pipeline.experiment.variation import change_of
 from validate.pipeline.run.method_run import Truth
 from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
-from validate.register.markers.markers import placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
 from validate.register.scene_registration import follow_signal
-from validate.register.signals import driving, holds_at, validating
+from validate.register.signals import SignalObservation, holds_at
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
@@ -210,9 +210,11 @@ def moved_truth(tree: Tree, seen: Registered) -> Truth:
 
 
 def place_moved(recording: Recording, tree: Tree, its: Scene) -> Registered:
-    stage = driving(recording, "stage", "m")
-    cell = validating(recording, "cell", "N", quantity="force", trace="stage.force")
-    markers = placed_markers(recording, its.mesh)
+    stage = SignalObservation.driving(recording, "stage", "m")
+    cell = SignalObservation.validating(
+        recording, "cell", "N", quantity="force", trace="stage.force"
+    )
+    markers = MarkerObservation.placed(recording, its.mesh)
     rest, *holds = holds_at(stage, stage.t, LOADS, 1e-6)
     return Registered((stage, markers, cell), tuple(holds), rest)
 

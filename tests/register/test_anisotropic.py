@@ -8,7 +8,7 @@ from validate.errors import RegistrationError
 from validate.recording.types import Markers
 from validate.register.markers import transform
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.markers import observe_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.markers.measures import target_covariance
 from validate.register.markers.transform import (
     Similarity,
@@ -78,7 +78,7 @@ def test_markers_seen_badly_in_depth_are_compared_with_their_own_noise() -> None
     names = tuple(f"m{i}" for i in range(12))
     markers = Markers(np.array([0.0]), names, x[None], 1e-4, "camera")
     layout = dict(zip(names, rest, strict=True))
-    seen = observe_markers(markers, layout, mesh, how=MarkerFit(sd=tuple(DEEP)))
+    seen = MarkerObservation.of(markers, layout, mesh, how=MarkerFit(sd=tuple(DEEP)))
     assert seen.axis_sd == pytest.approx((2e-3, 1e-4, 1e-4), rel=0.01)
     assert (seen.along([1, 2]), seen.along([0])) == pytest.approx((1e-4, 2e-3), rel=0.01)
     assert seen.sd == pytest.approx(np.sqrt((4e-6 + 2e-8) / 3))
@@ -86,8 +86,8 @@ def test_markers_seen_badly_in_depth_are_compared_with_their_own_noise() -> None
     own = weighted_covariance(rest, rest, covariance_of(DEEP), fit)
     assert seen.tre == pytest.approx(np.sqrt(np.trace(own, axis1=1, axis2=2)))
     with pytest.raises(RegistrationError, match=r"by direction.*'similarity'"):
-        observe_markers(markers, layout, mesh, how=MarkerFit("similarity", tuple(DEEP)))
-    assert observe_markers(markers, layout, mesh, how=MarkerFit(sd=(2e-3,))).sd == 2e-3
+        MarkerObservation.of(markers, layout, mesh, how=MarkerFit("similarity", tuple(DEEP)))
+    assert MarkerObservation.of(markers, layout, mesh, how=MarkerFit(sd=(2e-3,))).sd == 2e-3
 
 
 def test_points_that_already_fit_are_not_turned() -> None:

@@ -15,7 +15,7 @@ from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import EVERYTHING, Selection
 from validate.register.outlines.outlines import Corner, OutlineObservation
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, driving, validating
+from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.solve.types import Trace
 
@@ -48,7 +48,7 @@ def recorded(sd: float = SD_T) -> Recording:
 
 def test_a_ramps_clock_is_worth_its_speed() -> None:
     """By hand: 0.01 s of 5 N/s is 0.05 N that all samples share."""
-    seen = validating(recorded(), "force", "N", quantity="force", trace="f")
+    seen = SignalObservation.validating(recorded(), "force", "N", quantity="force", trace="f")
     for selection in (HOLD, EVERYTHING):
         (found,) = seen.deviations(STILL, selection)
         assert found.systematic == pytest.approx(0.05)
@@ -59,7 +59,10 @@ def test_a_ramps_clock_is_worth_its_speed() -> None:
 def test_the_drives_clock_counts_in_every_stream_and_once() -> None:
     moved = shift(recorded(0.03), "stage", Offset(0.0, 0.04, "correlation", 21, 1.0))
     seen = Registered(
-        (driving(moved, "stage", "m"), validating(moved, "force", "N", quantity="q", trace="f"))
+        (
+            SignalObservation.driving(moved, "stage", "m"),
+            SignalObservation.validating(moved, "force", "N", quantity="q", trace="f"),
+        )
     )
     again = replace(seen, outside=1)
     (found,) = again.compared[0].deviations(STILL, again.selections[0])

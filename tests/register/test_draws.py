@@ -15,11 +15,11 @@ from experiments.ultrasound_disk.round_outlines import RoundOutlines
 from validate import register
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Markers
 from validate.register.markers import displacements as from_rest_module
 from validate.register.markers.displacements import DisplacementObservation
-from validate.register.markers.markers import MarkerObservation, Together, observe_markers
+from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import (
     EVERYTHING,
     Draw,
@@ -33,7 +33,6 @@ from validate.register.observation import (
 from validate.register.outlines.outlines import (
     OutlineObservation,
     normals,
-    observe_outlines,
     polar_angles,
     ray_points,
 )
@@ -80,7 +79,7 @@ def markers(together: tuple[Together, ...] = ()) -> MarkerObservation:
     layout = {n: MESH.nodes[i] for n, i in zip(names, (0, 1, 2, 4), strict=True)}
     x = np.repeat(np.array(list(layout.values()))[None], 3, axis=0)
     seen = Markers(T, names, x, 1e-4, "camera")
-    return observe_markers(seen, layout, MESH, together=together)
+    return MarkerObservation.of(seen, layout, MESH, together=together)
 
 
 ALL = (Together("moved", (0, 1, 2), "all"),)
@@ -120,7 +119,7 @@ def test_what_was_not_seen_stays_so() -> None:
 def test_an_outline_read_exactly_lies_on_the_section() -> None:
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     circle = 0.005 + 0.002 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    seen = observe_outlines(
+    seen = OutlineObservation.of(
         Contours(T, (circle,) * 3, 1e-4, np.eye(4), "scene"),
         Wall(),
         0.0,  # type: ignore[arg-type]
@@ -252,7 +251,7 @@ def test_round_outlines_read_exactly_have_the_bodys_diameter() -> None:
 def test_displacements_read_exactly_leave_nothing_and_each_axis_has_its_noise() -> None:
     points = np.random.default_rng(0).uniform(0.001, 0.009, (3000, 3))
     sd = np.array([1e-5, 2e-5, 4e-5])
-    rows = barycentric_rows(MESH, points)
+    rows = Rows.barycentric(MESH, points)
     u = np.full(points.shape, 2e-3)
     seen = DisplacementObservation("beads", "validates", T[-1:], points, u, rows, sd)
     anew = seen.anew(seen.left(RUN), Exact())

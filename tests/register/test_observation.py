@@ -11,7 +11,7 @@ from validate.compare.verdict import errors_of
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.assembly.locate import nearest_node_rows
 from validate.recording.types import Contours, Markers
-from validate.register.markers.markers import MarkerObservation, Together, observe_markers, vector
+from validate.register.markers.markers import MarkerObservation, Together, vector
 from validate.register.observation import (
     EVERYTHING,
     Deviation,
@@ -19,13 +19,7 @@ from validate.register.observation import (
     frame_at,
     nearest_samples,
 )
-from validate.register.outlines.outlines import (
-    Corner,
-    OutlineObservation,
-    angular_points,
-    merged,
-    observe_outlines,
-)
+from validate.register.outlines.outlines import Corner, OutlineObservation, angular_points, merged
 from validate.register.registration import Registered
 from validate.register.signals import (
     SignalObservation,
@@ -176,10 +170,10 @@ def test_a_marker_belongs_to_the_body_within_a_tenth_of_a_millimetre(
     places = {"a": rest[0], "b": rest[1], "c": np.zeros(3), "d": np.eye(3)[0]}
     seen = Markers(np.zeros(1), tuple(places), np.array([list(places.values())]), 1e-4, "scene")
     if kept == 2:
-        observe_markers(seen, places, MESH)
+        MarkerObservation.of(seen, places, MESH)
         return
     with pytest.raises(RegistrationError, match=r"'a' by 0\.11 mm"):
-        observe_markers(seen, places, MESH)
+        MarkerObservation.of(seen, places, MESH)
 
 
 def still(*probes: str) -> Simulated:
@@ -298,7 +292,7 @@ def test_the_sd_of_an_outline_is_the_scatter_of_noisy_ones() -> None:
     stated = np.sqrt(2) * sd  # both outlines have a point near the corner's ray
     assert np.mean(found["corner"]) * stated == pytest.approx(-3e-3, rel=0.03)
     contours = Contours(T[:1], (ROUND,), sd, np.eye(4), "scene")
-    assert observe_outlines(contours, none, 0.0).sd_t == 0.0  # type: ignore[arg-type]
+    assert OutlineObservation.of(contours, none, 0.0).sd_t == 0.0  # type: ignore[arg-type]
     (still_one,) = Round("o", "validates", T[:1], (ROUND,), np.eye(4), sd, none, 0.0).deviations(  # type: ignore[arg-type]
         ramp(()), Selection("rest", T[:1])
     )
@@ -447,11 +441,11 @@ def test_markers_beside_their_layout_are_refused_and_nearest_nodes_read() -> Non
     rest = np.array([[0.0, 0.0, 1.0], [1.0, 1.0, 1.0], [1.0, 0.0, 0.9], [0.0, 1.0, 1.0]])
     found = Markers(np.array([0.0]), ("a", "b", "c", "d"), rest[None], 1e-5, "model")
     layout = dict(zip(found.names, rest, strict=True))
-    near = observe_markers(found, layout, MESH, sampling="nearest_node")
+    near = MarkerObservation.of(found, layout, MESH, sampling="nearest_node")
     assert near.positions.apply(MESH.nodes)[2] == pytest.approx([1.0, 0.0, 1.0])
     del layout["b"], layout["d"]
     with pytest.raises(RegistrationError, match=r"2 of 4 markers.*\['b', 'd'\]"):
-        observe_markers(found, layout, MESH)
+        MarkerObservation.of(found, layout, MESH)
 
 
 @pytest.mark.parametrize("text", ["1 2", "1 2 east", "", "1 2 nan", "1 2 3 4"])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from validate.arrays import rms
 from validate.errors import RegistrationError
-from validate.register import Similarity, fit_similarity, register_points
+from validate.register import Registration, Similarity, fit_similarity
 from validate.register.markers.measures import (
     Reflection,
     chi_square_bound,
@@ -58,7 +58,7 @@ def cloud(seed, k=12, d=3):
 
 
 def register(x, y, **options):
-    return register_points(NAMES[: len(y)], x, y, **{"expected_sd": SD, **options})
+    return Registration.of(NAMES[: len(y)], x, y, **{"expected_sd": SD, **options})
 
 
 def message(x, y, **options):
@@ -223,7 +223,7 @@ def test_wrong_inputs_are_refused():
     assert "method 'affine'" in message(y, y, method="affine")
     assert "not finite" in message(np.where(y == y[0, 0], np.inf, y), y)
     with pytest.raises(RegistrationError, match="4 names, 3 different"):
-        register_points(["a", "b", "c", "a"], y[:4], y[:4], expected_sd=SD)
+        Registration.of(["a", "b", "c", "a"], y[:4], y[:4], expected_sd=SD)
 
 
 # --- degenerate sets ---

@@ -8,7 +8,7 @@ import pytest
 from validate.errors import UsageError
 from validate.parameters import with_values
 from validate.recording.types import Markers
-from validate.register.markers.markers import MarkerObservation, observe_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.sensing import ForceSensing, PoseShift, Sensing
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
@@ -63,7 +63,7 @@ def tracked() -> MarkerObservation:
     x = np.stack([rest, rest + [0.0, 0.0, 1e-3]])
     markers = Markers(np.array([0.0, 1.0]), names, x, 1e-5, "model")
     layout = dict(zip(names, rest, strict=True))
-    return observe_markers(markers, layout, box((side,) * 3, (1, 1, 1)))
+    return MarkerObservation.of(markers, layout, box((side,) * 3, (1, 1, 1)))
 
 
 def test_a_pose_turns_displacements_and_shifts_positions() -> None:

@@ -14,8 +14,7 @@ from validate.fem.cavity import cavity_surface
 from validate.recording.types import Contours
 from validate.register.outlines import sweep
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
-from validate.scene.geometries.inclusion import Block, block_with_inclusion
-from validate.scene.mesh import cell_volumes
+from validate.scene.geometries.inclusion import Block
 from validate.twin.ultrasound import Scanner
 
 # private: _beside, _clearest, _tracked: called alone, case by case.
@@ -97,12 +96,12 @@ def test_a_sweep_of_images_gives_volume_and_surface(stack: Stack) -> None:
 def test_the_surface_becomes_a_mesh(stack: Stack) -> None:
     surface = surface_of(stack, 1)
     block = Block(0.060, 0.045, 0.070)
-    mesh = block_with_inclusion(block, (9, 9, 12), surface)
+    mesh = block.around((9, 9, 12), surface)
     wall = mesh.nodes[mesh.facet_nodes("cavity")]
     assert np.abs(surface.distance(wall)).max() < 1e-12
-    assert cell_volumes(mesh).min() > 0
+    assert mesh.cell_volumes().min() > 0
     hole = cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes)
-    assert cell_volumes(mesh).sum() + hole == pytest.approx(np.prod(block.sizes), rel=1e-11)
+    assert mesh.cell_volumes().sum() + hole == pytest.approx(np.prod(block.sizes), rel=1e-11)
     assert 0.8 * OVAL.volume < hole < 1.02 * OVAL.volume
 
 

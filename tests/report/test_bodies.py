@@ -13,7 +13,7 @@ from report_samples import small_result
 from tracking_samples import tracking_result
 
 from validate.compare.result import Result
-from validate.fem.assembly.locate import barycentric_rows, nearest_node_rows
+from validate.fem.assembly.locate import Rows, nearest_node_rows
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.markers import MarkerObservation
 from validate.report.scenes import gl
@@ -94,7 +94,7 @@ def test_markers_stand_where_they_were_measured_and_where_the_run_has_them() -> 
 def test_particles_are_markers_inside_of_the_body() -> None:
     mesh = small_result().methods[0].scene.mesh
     inner = mesh.nodes.mean(axis=0) + 1e-4 * np.arange(900.0)[:, None] * [0.01, 0.02, 0.0]
-    rows = barycentric_rows(mesh, inner)
+    rows = Rows.barycentric(mesh, inner)
     measured = np.tile([0.0, 0.0, -1e-3], (900, 1))
     beads = DisplacementObservation("beads", "validates", np.ones(1), inner, measured, rows,
                                     np.full(3, 1e-5))  # fmt: skip

@@ -11,7 +11,7 @@ from validate.report.scenes import gl
 from validate.report.scenes.body import skins
 from validate.report.scenes.panels import surface_of
 from validate.scene.geometries.specification import Box
-from validate.scene.mesh import Kind, quadratic
+from validate.scene.mesh import Kind
 from validate.scene.shape_functions import LATTICE
 
 ROD = bending_rod(3)
@@ -31,7 +31,7 @@ def test_a_surface_is_whole_and_bends_as_its_elements_do(kind: Kind) -> None:
     them."""
     linear = "hex8" if kind.startswith("hex") else "tet4"
     mesh = Box((0.2, 0.1, 0.1), cells=(2, 1, 1), element=linear).resolved(Path())
-    mesh = mesh if kind == linear else quadratic(mesh)
+    mesh = mesh if kind == linear else mesh.quadratic()
     surface = surface_of(mesh)
     x = surface.at(mesh.nodes)
     corners = x[surface.every(surface.triangles).reshape(-1, 3)]

@@ -15,7 +15,7 @@ from validate.compare.residual import Residual
 from validate.compare.row import POINT, LongRow
 from validate.compare.score import Score
 from validate.errors import ComparisonError, RecordingError, UsageError
-from validate.report import open_store
+from validate.report import StoredTables
 from validate.report.export import parquet
 from validate.report.export.parquet import column_types
 from validate.report.export.table_file import CSV, PARQUET, stored_table, write_long_table
@@ -210,14 +210,14 @@ def test_one_expression_asks_every_stored_run(
         kept(tmp_path / run, LongTable({"kind": "twin", "methods": [{"name": "fem"}]}, rows))
     (kept(tmp_path / "damaged", sample())).write_bytes(b"x")
     pytest.importorskip("pandas")
-    store = open_store(tmp_path)
+    store = StoredTables.open(tmp_path)
     found = store.where(part="score", quantity="marker.*", statistic="rms").to_pandas()
     assert found[["run", "method", "value"]].values.tolist() == [
         ["a", "fem", 1e-3], ["a", "kf", 1e-3], ["b", "fem", 2e-3], ["b", "kf", 2e-3],
     ]  # fmt: skip
     assert f"damaged/{form}: ignored" in caplog.text
-    assert len(list(open_store(tmp_path / "a").rows())) == 5
-    one = open_store(tmp_path).where(run="b", method=("fem", "none"), at=0.009, part="score")
+    assert len(list(StoredTables.open(tmp_path / "a").rows())) == 5
+    one = StoredTables.open(tmp_path).where(run="b", method=("fem", "none"), at=0.009, part="score")
     assert [r.quantity for r in one.where(statistic="m*").rows()] == ["marker.inplane"]
 
 
@@ -234,7 +234,7 @@ def test_nothing_is_read_before_rows_are_asked_for(
         return stored_table(folder, **labels)
 
     monkeypatch.setattr(stored_tables, "stored_table", noted)
-    query = open_store(tmp_path).where(statistic="rms")
+    query = StoredTables.open(tmp_path).where(statistic="rms")
     assert read == []
     next(iter(query))
     assert read == ["a"]
@@ -242,9 +242,9 @@ def test_nothing_is_read_before_rows_are_asked_for(
 
 def test_an_unknown_column_and_folder_are_named(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no column 'statstic'; nearest: statistic"):
-        open_store(tmp_path).where(statstic="rms")
+        StoredTables.open(tmp_path).where(statstic="rms")
     with pytest.raises(UsageError, match="no folder of stored runs"):
-        open_store(tmp_path / "none")
+        StoredTables.open(tmp_path / "none")
 
 
 def test_names_with_brackets_are_texts() -> None:
@@ -278,5 +278,5 @@ def test_a_folder_of_something_else_has_no_rows(
     for name, content in others.items():
         (tmp_path / name).mkdir()
         write_json(content, tmp_path / name / "results.json")
-    assert [t.rows[0].run for t in open_store(tmp_path)] == ["cube"]
+    assert [t.rows[0].run for t in StoredTables.open(tmp_path)] == ["cube"]
     assert caplog.messages == ["odd: its results cannot be read: KeyError('experiment')"]

@@ -12,7 +12,7 @@ from report_samples import small_result
 
 from validate.recording.outlines.outline import outlines_of
 from validate.recording.types import Contours, Frames, Recording, Source
-from validate.register.markers.quality import Registration, register_points
+from validate.register.markers.quality import Registration
 from validate.report.charts.style import WIDTH, painted
 from validate.report.scenes import outline_images as module
 from validate.report.scenes.body import flattest
@@ -31,7 +31,7 @@ def registered(points: np.ndarray, sd: float = SD) -> Registration:
     """Markers seen with noise against their own layout."""
     names = tuple(f"marker_{i}" for i in range(len(points)))
     seen = points + np.random.default_rng(0).normal(0, sd, points.shape)
-    return register_points(names, seen, points, expected_sd=sd)
+    return Registration.of(names, seen, points, expected_sd=sd)
 
 
 def arrows(found: Registration) -> Figure:

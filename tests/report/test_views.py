@@ -16,7 +16,7 @@ from validate.compare.row import LongRow, RowBlock
 from validate.compare.view import View
 from validate.errors import ComparisonError, UsageError
 from validate.library.plots import ShownView, plots_of
-from validate.report import open_store
+from validate.report import StoredTables
 from validate.report.export.table_file import stored_table
 from validate.report.export.tables import shown
 from validate.report.long_table import LongTable
@@ -339,7 +339,7 @@ def test_numbers_of_a_study_are_rows_of_the_store(tmp_path: Path) -> None:
     content = {**document(replace(small_result(), exhibits=(shows(),)), "2026"), "methods": []}
     (tmp_path / "study-a").mkdir()
     write_json(content, tmp_path / "study-a" / "results.json")
-    found = open_store(tmp_path).where(part="table", statistic="force").rows()
+    found = StoredTables.open(tmp_path).where(part="table", statistic="force").rows()
     assert [(r.run, r.value) for r in found] == [("study-a", 0.002)]
 
 

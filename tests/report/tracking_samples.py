@@ -12,9 +12,9 @@ from validate.compare.result import MethodResult, Result
 from validate.compare.score import run_scores, scores_of
 from validate.compare.verdict import Check
 from validate.recording.types import Markers, Recording, Signal, Source
-from validate.register.markers.markers import observe_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
-from validate.register.signals import driving
+from validate.register.signals import SignalObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
@@ -67,8 +67,8 @@ def seen() -> tuple[Recording, Registered]:
         signals={"push": push}, markers={"markers": markers},
     )  # fmt: skip
     layout = {name: np.array(point) for name, point in NODES.items()}
-    observed = observe_markers(markers, layout, body().mesh)
-    return recording, Registered((driving(recording, "push", "N"), observed))
+    observed = MarkerObservation.of(markers, layout, body().mesh)
+    return recording, Registered((SignalObservation.driving(recording, "push", "N"), observed))
 
 
 def traces(scale: float, count: int) -> dict[str, Trace]:

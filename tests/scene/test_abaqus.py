@@ -8,7 +8,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.scene.geometries.box import grid
-from validate.scene.mesh import Mesh, cell_volumes, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_files import abaqus_arrays
 from validate.scene.mesh_files import abaqus_text as abaqus_lines
 from validate.scene.mesh_files.abaqus_arrays import placed
@@ -42,7 +42,7 @@ def body(kind: str) -> Mesh:
     if kind == "hex8":
         return mesh
     linear = Mesh(mesh.nodes, mesh.simplices, "tet4")
-    return quadratic(linear) if kind == "tet10" else linear
+    return linear.quadratic() if kind == "tet10" else linear
 
 
 @pytest.mark.parametrize("kind", SHAPES)
@@ -54,7 +54,7 @@ def test_a_body_comes_back_whole(tmp_path: Path, kind: str) -> None:
     assert (got.kind, got.cells.shape, len(got.nodes)) == (
         kind, whole.cells.shape, len(whole.nodes),
     )  # fmt: skip
-    assert cell_volumes(got).sum() == pytest.approx(1e-6 * 6e-6)
+    assert got.cell_volumes().sum() == pytest.approx(1e-6 * 6e-6)
     np.testing.assert_allclose(got.nodes[got.cells], 0.01 * whole.nodes[whole.cells], atol=1e-12)
     assert list(got.facets) == ["lower_plate"]
     lower = got.nodes[got.facet_nodes("lower_plate")]
@@ -65,7 +65,7 @@ def test_a_body_comes_back_whole(tmp_path: Path, kind: str) -> None:
 def test_the_liver(shared_data: Path) -> None:
     got = read_foreign(shared_data / LIVER, "m").mesh
     assert (got.kind, len(got.nodes), len(got.cells)) == ("tet4", 935, 4408)
-    assert 0.5e-3 < cell_volumes(got).sum() < 3e-3  # m3: a liver of half a litre to three
+    assert 0.5e-3 < got.cell_volumes().sum() < 3e-3  # m3: a liver of half a litre to three
     assert {"Disp", "FixT&P"} <= set(got.facets)
 
 
@@ -306,7 +306,7 @@ def test_a_rigid_punch_beside_the_body_is_left_out_and_told(tmp_path: Path) -> N
     path = tmp_path / "cae.inp"
     path.write_text(cae(body("tet4"), "").replace("*Assembly", punch, 1))
     got = read_foreign(path, "mm")
-    assert cell_volumes(got.mesh).sum() == pytest.approx(6e-6)
+    assert got.mesh.cell_volumes().sum() == pytest.approx(6e-6)
     assert got.told["left out"].startswith("'Punch' in addition to the solid")
 
 
@@ -341,7 +341,7 @@ def test_a_set_of_elements_is_a_part(tmp_path: Path) -> None:
     path.write_text(inp(whole, extra=rows))
     assert "joint" not in read_foreign(path, "m").mesh.facets
     got = read_foreign(path, "m", "upper")
-    assert cell_volumes(got.mesh).sum() == pytest.approx(3e-6)
+    assert got.mesh.cell_volumes().sum() == pytest.approx(3e-6)
     assert got.mesh.nodes[:, 2].min() == 0.015
     assert got.mesh.nodes[got.mesh.facet_nodes("joint"), 2].max() == 0.015
     with pytest.raises(SceneError, match=r"no part 'x'; .*'Upper', .*by size 1"):

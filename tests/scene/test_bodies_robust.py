@@ -23,7 +23,7 @@ from test_abaqus import body, cae, inp
 
 from validate.commands.main import cli, run
 from validate.errors import SceneError
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import MAX_BYTES, filled, read_mesh, write_mesh
 from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
@@ -77,7 +77,7 @@ def attacked(path: Path) -> None:
         assert said.startswith(path.name)
         assert said.isprintable()
     else:
-        assert (cell_volumes(mesh) > 0).all()
+        assert (mesh.cell_volumes() > 0).all()
 
 
 def under_attack(path: Path, cuts: int, flips: int) -> None:

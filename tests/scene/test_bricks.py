@@ -12,13 +12,7 @@ from validate.errors import SceneError
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.refinement import linear, refined
 from validate.scene.material import Material
-from validate.scene.mesh import (
-    Mesh,
-    boundary_facets,
-    cell_volumes,
-    quadratic,
-    require_positive_cells,
-)
+from validate.scene.mesh import Mesh, boundary_facets, require_positive_cells
 from validate.scene.scene import Cavity, Drive, Foundation, Scene, Weight
 from validate.scene.shape_functions import CORNERS
 
@@ -32,7 +26,7 @@ def test_bricks_fill_the_block_and_number_as_the_simplices_do(
     mesh, split = grid(size, cells), box(size, cells)
     assert np.array_equal(mesh.nodes, split.nodes)
     assert len(mesh.cells) == np.prod(cells)
-    assert cell_volumes(mesh) == pytest.approx(
+    assert mesh.cell_volumes() == pytest.approx(
         np.full(len(mesh.cells), np.prod(size / np.array(cells)))
     )
     first = mesh.nodes[mesh.cells[0]] * np.array(cells) / np.array(size)
@@ -73,7 +67,7 @@ def test_split_bricks_fill_the_mesh_and_meet(
 
 def test_a_folded_quadrilateral_is_refused_though_its_area_is_positive() -> None:
     dart = Mesh(np.array([[0, 0], [1, 0], [0.2, 0.2], [0, 1.0]]), np.array([[0, 1, 2, 3]]), "quad4")
-    assert cell_volumes(dart)[0] == pytest.approx(0.2)
+    assert dart.cell_volumes()[0] == pytest.approx(0.2)
     with pytest.raises(SceneError, match="1 of 1 elements inverted or flat"):
         require_positive_cells(dart)
 
@@ -83,9 +77,9 @@ def test_hexahedra_are_halved_as_a_finer_grid_has_them() -> None:
     shear = np.array([[1, 0, 0], [0.3, 1, 0], [0, 0.2, 1]])
     coarse, fine = (grid((1.0, 2.0, 3.0), cells) for cells in ((1, 2, 1), (2, 4, 2)))
     body = Mesh(coarse.nodes @ shear, coarse.cells, "hex8", coarse.facets)
-    got = refined(Scene(quadratic(body), Material(1.0, 0.3))).mesh
+    got = refined(Scene(body.quadratic(), Material(1.0, 0.3))).mesh
     assert got.kind == "hex8"
-    assert cell_volumes(got) == pytest.approx(np.full(16, 6 / 16))
+    assert got.cell_volumes() == pytest.approx(np.full(16, 6 / 16))
 
     def places(nodes: Floats, rows: Ints) -> list[list[tuple[float, ...]]]:
         x = np.round(nodes[rows], 9) + 0.0
@@ -104,7 +98,7 @@ def test_hexahedra_are_halved_as_a_finer_grid_has_them() -> None:
 def test_what_bricks_do_not_have_is_refused() -> None:
     rod = bending_rod(1)
     with pytest.raises(SceneError, match="quad4 have no quadratic form"):
-        quadratic(needle_block(4).mesh)
+        needle_block(4).mesh.quadratic()
     with pytest.raises(SceneError, match="quad4 have no quadratic form"):
         refined(needle_block(4))
     with pytest.raises(SceneError, match=r"nodal mean dilatation.*hex8"):
@@ -140,7 +134,7 @@ def test_drives_and_weights_are_checked() -> None:
 
 def test_quadratic_hexahedra_have_a_node_at_every_place_once() -> None:
     mesh = grid((3.0, 2.0, 1.0), (2, 3, 1))
-    fine = quadratic(mesh)
+    fine = mesh.quadratic()
     assert (fine.kind, fine.order, len(fine.nodes)) == ("hex27", 2, 5 * 7 * 3)
     assert np.array_equal(fine.nodes[: len(mesh.nodes)], mesh.nodes)
     assert np.unique(fine.nodes.round(9), axis=0).shape == fine.nodes.shape

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from validate.scene.geometries.indented_bodies import clustered, clustered_block
-from validate.scene.mesh import cell_volumes, require_positive_cells
+from validate.scene.mesh import require_positive_cells
 
 
 @pytest.mark.parametrize("at", [0.0, 0.3, 0.5, 1.0])
@@ -34,4 +34,4 @@ def test_the_lines_of_a_finer_block_hold_those_of_a_coarser_one() -> None:
         assert lines[1][::2] == pytest.approx(lines[0], abs=1e-12)
     require_positive_cells(fine)
     volume = np.prod(np.subtract(high, low))
-    assert cell_volumes(fine).sum() == pytest.approx(volume, rel=1e-12)
+    assert fine.cell_volumes().sum() == pytest.approx(volume, rel=1e-12)

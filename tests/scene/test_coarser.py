@@ -13,7 +13,7 @@ from validate.scene.geometries import refinement
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.refinement import _filling, coarser, size_against
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Scene, Support
 
 # private: _filling: a cache, emptied as by a new process.
@@ -41,7 +41,7 @@ def test_it_is_the_same_body_with_fewer_nodes_and_its_sets(fine: Mesh) -> None:
     assert coarse.kind == "tet4"
     assert 1.2 < size_against(fine, coarse) < 3
     assert len(coarser(fine, 2).nodes) < len(coarse.nodes)
-    assert cell_volumes(coarse).sum() == pytest.approx(np.prod(SIZE), rel=5e-3)
+    assert coarse.cell_volumes().sum() == pytest.approx(np.prod(SIZE), rel=5e-3)
     for axis, (name, other) in enumerate((("x0", "x1"), ("y0", "y1"), ("z0", "z1"))):
         for side, at in ((name, 0.0), (other, SIZE[axis])):
             assert coarse.nodes[coarse.facet_nodes(side)][:, axis] == pytest.approx(at, abs=4e-4)
@@ -62,7 +62,7 @@ def test_a_cavity_stays_a_cavity() -> None:
     x = hollow.nodes[hollow.surface].mean(axis=1)
     wall = hollow.surface[np.abs(x - 0.015).max(axis=1) < 0.006]
     coarse = coarser(replace(hollow, facets={"wall": wall}))
-    assert cell_volumes(coarse).sum() == pytest.approx(0.03**3 - 0.01**3, rel=0.01)
+    assert coarse.cell_volumes().sum() == pytest.approx(0.03**3 - 0.01**3, rel=0.01)
     at = coarse.nodes[coarse.facet_nodes("wall")] - 0.015
     assert np.abs(at).max(axis=1) == pytest.approx(0.005, abs=6e-4)
 

@@ -11,7 +11,6 @@ from validate.scene.geometries.box import box
 from validate.scene.laws import LAWS, Coefficients, lost_stability
 from validate.scene.material import Material
 from validate.scene.meshless import MaterialPoint
-from validate.scene.rubber import mooney_rivlin, ogden, yeoh
 from validate.scene.scene import Scene
 
 
@@ -37,7 +36,7 @@ def test_malformed_coefficients_are_refused() -> None:
         with pytest.raises(SceneError, match=r"between 0 and 1.*above 1"):
             Coefficients(stretches=wrong)
     with pytest.raises(SceneError, match="Ogden: 2 moduli for 1 powers"):
-        ogden((1.0, 2.0), (2.0,), 0.4)
+        Material.ogden((1.0, 2.0), (2.0,), 0.4)
 
 
 def test_another_law_keeps_what_it_knows() -> None:
@@ -59,19 +58,19 @@ def test_a_mooney_rivlin_that_turns_soft_says_at_which_stretch() -> None:
     2 (C10 l^2 + C01/l^2): nothing left at l = (-C01/C10)^(1/4)."""
     C10, C01 = 1200.0, -200.0
     with pytest.raises(SceneError, match="C10 = 1200 Pa, C01 = -200 Pa loses") as refused:
-        mooney_rivlin(C10, C01, 0.45)
+        Material.mooney_rivlin(C10, C01, 0.45)
     assert "(equibiaxial)" in str(refused.value)
     assert at_stretch(str(refused.value)) == pytest.approx((-C01 / C10) ** 0.25, rel=3e-3)
-    assert mooney_rivlin(C10, C01, 0.45, stretches=(0.65, 1.5)).shear_modulus == 2000.0
+    assert Material.mooney_rivlin(C10, C01, 0.45, stretches=(0.65, 1.5)).shear_modulus == 2000.0
 
 
 def test_no_stretch_short_of_the_named_one_is_unstable() -> None:
     """Yeoh with C20 < 0: true stress rises along every curve up to the stretch that is refused."""
     with pytest.raises(SceneError, match="loses positive energy") as refused:
-        yeoh(1000.0, -100.0, 0.0, 0.4999)
+        Material.yeoh(1000.0, -100.0, 0.0, 0.4999)
     end = abs(np.log(at_stretch(str(refused.value))))
     ends = (float(np.exp(-0.98 * end)), float(np.exp(0.98 * end)))
-    card = yeoh(1000.0, -100.0, 0.0, 0.4999, stretches=ends)
+    card = Material.yeoh(1000.0, -100.0, 0.0, 0.4999, stretches=ends)
     stretches = np.exp(np.linspace(-0.97 * end, 0.97 * end, 30))
     found = response(MaterialPoint(card, "uniaxial"), stretches)["nominal_stress"]
     assert (np.diff(found * stretches) > 0).all()
@@ -83,8 +82,8 @@ def at_stretch(words: str) -> float:
 
 def test_the_coupled_form_keeps_the_volume_stiff() -> None:
     with pytest.raises(SceneError, match="lambda - 4 C01 - 8 C20 >= 0, it is -"):
-        mooney_rivlin(1e3, 1e3, 0.1, "coupled")
-    assert mooney_rivlin(1e3, 1e3, 0.45, "coupled").nu == 0.45
+        Material.mooney_rivlin(1e3, 1e3, 0.1, "coupled")
+    assert Material.mooney_rivlin(1e3, 1e3, 0.45, "coupled").nu == 0.45
 
 
 def test_coefficients_are_reached_by_the_paths_of_the_material() -> None:

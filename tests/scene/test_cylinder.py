@@ -5,7 +5,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.scene.geometries.specification import hexahedral_cylinder, quarter_cylinder
-from validate.scene.mesh import boundary_facets, cell_volumes, require_positive_cells
+from validate.scene.mesh import boundary_facets, require_positive_cells
 
 EXACT = np.pi * 0.05**2 / 16 * 0.03
 
@@ -14,12 +14,12 @@ EXACT = np.pi * 0.05**2 / 16 * 0.03
 def test_the_mesh_has_the_circles_area(radial: int, grading: float) -> None:
     """A polygon of 16 corners on the circle has 97.45 % of it, and so would the force."""
     mesh = quarter_cylinder(0.05, 0.03, radial, 2, grading)
-    assert cell_volumes(mesh).sum() == pytest.approx(EXACT, rel=1e-12)
+    assert mesh.cell_volumes().sum() == pytest.approx(EXACT, rel=1e-12)
 
 
 def test_volume_converges_to_the_exact_one_at_second_order() -> None:
     volumes = [
-        cell_volumes(quarter_cylinder(0.05, 0.03, n, 2, inscribed=True)).sum() for n in (4, 8, 16)
+        quarter_cylinder(0.05, 0.03, n, 2, inscribed=True).cell_volumes().sum() for n in (4, 8, 16)
     ]
     errors = 1 - np.array(volumes) / EXACT
     assert errors.min() > 0  # inscribed polygon
@@ -34,8 +34,8 @@ def test_volume_is_that_of_the_inscribed_polygon(radial: int, axial: int) -> Non
     area = radial * 0.025**2 * np.sin(np.pi / (4 * radial))
     assert len(mesh.nodes) == (radial + 1) ** 2 * (axial + 1)
     assert len(mesh.cells) == 6 * radial**2 * axial
-    assert cell_volumes(mesh).min() > 0
-    assert cell_volumes(mesh).sum() == pytest.approx(0.03 * area, rel=1e-12)
+    assert mesh.cell_volumes().min() > 0
+    assert mesh.cell_volumes().sum() == pytest.approx(0.03 * area, rel=1e-12)
 
 
 def test_sets_lie_on_their_planes_and_cover_the_boundary() -> None:
@@ -63,7 +63,7 @@ def test_empty_cylinders_are_refused(
 
 def test_grading_shrinks_cells_towards_rim_and_plates_and_keeps_the_volume() -> None:
     plain, graded = (quarter_cylinder(0.05, 0.03, 6, 8, g, inscribed=True) for g in (1.0, 2.0))
-    assert cell_volumes(graded).sum() == pytest.approx(cell_volumes(plain).sum(), rel=1e-12)
+    assert graded.cell_volumes().sum() == pytest.approx(plain.cell_volumes().sum(), rel=1e-12)
     z = np.unique(np.round(graded.nodes[:, 2], 9))
     assert z[1] - z[0] == pytest.approx((z[4] - z[3]) / 7)  # 1/16 and 7/16 of the half height
     assert z + z[::-1] == pytest.approx(np.full(9, 0.03))
@@ -78,7 +78,7 @@ def test_hexahedra_of_a_cylinder_have_its_volume_and_its_faces(radial: int, axia
     assert mesh.kind == "hex8"
     assert len(mesh.cells) == axial * radial * (radial + 4 * ((radial + 1) // 2))
     require_positive_cells(mesh)
-    assert cell_volumes(mesh).sum() == pytest.approx(np.pi * 0.01**2 * 0.03, rel=1e-12)
+    assert mesh.cell_volumes().sum() == pytest.approx(np.pi * 0.01**2 * 0.03, rel=1e-12)
     disc = radial * (radial + 4 * ((radial + 1) // 2))
     assert len(mesh.facets["lower_plate"]) == len(mesh.facets["upper_plate"]) == disc
     assert len(mesh.facets["rim"]) == 4 * radial * axial

@@ -15,7 +15,7 @@ from validate.commands.main import cli
 from validate.errors import SceneError, UsageError, ValidateError
 from validate.scene.body_facts import facts, odd_size, quality
 from validate.scene.geometries.box import grid
-from validate.scene.mesh import Mesh, boundary_facets, cell_volumes, quadratic
+from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.mesh_files import meshio_arrays, third_party_meshes, vtu
 from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.third_party_meshes import read_foreign
@@ -92,7 +92,7 @@ def test_a_version_of_gmsh_may_be_written_with_zeros(tmp_path: Path) -> None:
 @pytest.mark.parametrize("write", [gmsh2, gmsh4])
 def test_groups_of_gmsh_are_facet_sets(write: Callable[[Path, Mesh], Path], tmp_path: Path) -> None:
     body = read_foreign(write(tmp_path / "x.msh", linear()), "mm")
-    assert cell_volumes(body.mesh).sum() == pytest.approx(np.prod(SIZE))
+    assert body.mesh.cell_volumes().sum() == pytest.approx(np.prod(SIZE))
     low = body.mesh.facet_nodes("plate")
     assert np.abs(body.mesh.nodes[low, 2]).max() < 1e-12
     assert len(body.mesh.facets["plate"]) == 4
@@ -109,8 +109,8 @@ def test_elements_told_the_other_way_round_are_turned_and_told(suffix: str, tmp_
     cells = np.hstack([np.full((len(wrong), 1), 4), wrong]).ravel()
     pv.UnstructuredGrid(cells, types, 1e3 * mesh.nodes).save(tmp_path / f"x{suffix}")
     body = read_foreign(tmp_path / f"x{suffix}", "mm")
-    assert (cell_volumes(body.mesh) > 0).all()
-    assert cell_volumes(body.mesh).sum() == pytest.approx(np.prod(SIZE))
+    assert (body.mesh.cell_volumes() > 0).all()
+    assert body.mesh.cell_volumes().sum() == pytest.approx(np.prod(SIZE))
     assert body.told["turned"] == f"{len(wrong[::2])} of {len(wrong)} elements"
 
 
@@ -118,7 +118,7 @@ def test_hexahedra_and_quadratic_tetrahedra_come_in(tmp_path: Path) -> None:
     hexahedra = grid(SIZE, (2, 2, 2))
     meshio.Mesh(hexahedra.nodes, [("hexahedron", hexahedra.cells)]).write(tmp_path / "h.vtu")
     assert read_foreign(tmp_path / "h.vtu", "m").mesh.kind == "hex8"
-    curved = quadratic(linear())
+    curved = linear().quadratic()
     body = read_mesh(_inp(tmp_path / "q.vtu", curved), "m")
     assert (body.kind, len(body.nodes)) == ("tet10", len(curved.nodes))
 
@@ -136,7 +136,7 @@ def test_a_sphere_is_filled_to_its_volume(tmp_path: Path, monkeypatch: pytest.Mo
     surface = pv.Icosphere(radius=10.0, nsub=3)
     surface.save(tmp_path / "ball.stl")
     body = filled(tmp_path / "ball.stl", "mm", 4e-3)
-    assert cell_volumes(body.mesh).sum() == pytest.approx(1e-9 * surface.volume, rel=5e-3)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(1e-9 * surface.volume, rel=5e-3)
     assert (quality(body.mesh) > 0.1).all()
     edges = np.linalg.norm(body.mesh.nodes[body.mesh.cells[:, 0]]
                            - body.mesh.nodes[body.mesh.cells[:, 1]], axis=1)  # fmt: skip
@@ -156,7 +156,7 @@ def test_an_open_surface_is_refused_with_its_open_edges(tmp_path: Path) -> None:
 def test_the_beam_of_others_is_filled(shared_data: Path) -> None:
     """30 x 30 x 100 mm, as its makers say."""
     body = filled(shared_data / "markers/silicone-beam/beam.stl", "mm", 8e-3)
-    assert cell_volumes(body.mesh).sum() == pytest.approx(90e-6, rel=0.01)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(90e-6, rel=0.01)
 
 
 @pytest.mark.own_process
@@ -231,7 +231,7 @@ def test_one_of_two_bodies_is_chosen_by_size_and_by_label(suffix: str, tmp_path:
         done = run.invoke(cli, ["body", str(path), *unit, "--part", part, "-o", str(out)])
         assert done.exit_code == 0, done.output
         got = read_mesh(out)
-        assert cell_volumes(got).sum() == pytest.approx(volume, rel=1e-3)
+        assert got.cell_volumes().sum() == pytest.approx(volume, rel=1e-3)
         assert got.nodes[:, 0].min() == pytest.approx(0.05 if part == "1" else 0.0, abs=1e-4)
         if suffix != ".stl":
             low = got.facets["plate"]
@@ -254,7 +254,7 @@ def test_a_label_of_gmsh_is_a_part(tmp_path: Path) -> None:
     assert read_foreign(path, "mm").told["parts"] == "fat, label 5: one alone by --part"
     fat, other = (read_foreign(path, "mm", part).mesh for part in ("fat", "label 5"))
     for half, low in ((fat, 0.0), (other, SIZE[2] / 2)):
-        assert cell_volumes(half).sum() == pytest.approx(np.prod(SIZE) / 2)
+        assert half.cell_volumes().sum() == pytest.approx(np.prod(SIZE) / 2)
         assert half.nodes[:, 2].min() == low
 
 

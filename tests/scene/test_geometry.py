@@ -19,7 +19,6 @@ from validate.scene.geometries.specification import (
     cell_size,
 )
 from validate.scene.material import Material, Region
-from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_files.mesh_file import write_mesh
 from validate.scene.places import OnPlane, facets_of, nodes_of, place_of
 from validate.scene.scene import Foundation, Mass, Membrane, Scene, Support
@@ -35,7 +34,7 @@ def test_a_block_has_its_volume(element: str, symmetry: tuple[str, ...], share: 
     box = replace(BOX, element=element, symmetry=symmetry)
     mesh = box.resolved(HERE)
     assert mesh.kind == element
-    assert cell_volumes(mesh).sum() == pytest.approx(share * 8e-6, rel=1e-9)
+    assert mesh.cell_volumes().sum() == pytest.approx(share * 8e-6, rel=1e-9)
     assert box.copies * share == 1
     assert [s.facets for s in box.held] == [f"{axis}0" for axis in symmetry]
 

@@ -9,7 +9,6 @@ from click.testing import CliRunner
 from validate.commands.main import cli
 from validate.errors import SceneError, UsageError
 from validate.scene.body_facts import quality
-from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_files.mesh_file import read_mesh
 from validate.scene.mesh_files.third_party_meshes import read_foreign
 
@@ -22,7 +21,7 @@ SIDES = {f"side{i}": n for i, n in enumerate((6, 6, 12, 12, 12, 12), 1)}
 @pytest.mark.parametrize("name", ["groups_41.msh", "groups_41_binary.msh", "all.inp", "order2.inp"])
 def test_groups_become_facet_sets(name: str) -> None:
     body = read_foreign(FILES / name, "mm")
-    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-5)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(6e-5)
     found = {k: len(f) for k, f in body.mesh.facets.items()}
     assert {k: found[k] for k in SIDES} == SIDES
     top = body.mesh.nodes[body.mesh.facet_nodes("side6")]
@@ -50,7 +49,7 @@ def test_straight_quadratic_bricks_come_in(name: str, tmp_path: Path) -> None:
     """Two bricks of 10 x 20 x 15 mm with a node on every edge, or on faces and within, too."""
     body = read_foreign(FILES / name, "mm")
     assert (body.mesh.kind, body.mesh.cells.shape) == ("hex27", (2, 27))
-    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(6e-6)
     assert quality(body.mesh).min() == pytest.approx(1)
     bottom = body.mesh.facets["bottom" if name.endswith("msh") else "Surface5"]
     assert np.abs(body.mesh.nodes[bottom][..., 2]).max() < 1e-12

@@ -8,8 +8,8 @@ from phantoms import BLOCK, CAPSULE, COARSE_GRID, PAPER_GRID, phantom_mesh
 
 from validate.errors import SceneError
 from validate.fem.cavity import cavity_surface
-from validate.scene.geometries.inclusion import SIDES, Block, Capsule, block_with_inclusion
-from validate.scene.mesh import cell_volumes, require_positive_cells
+from validate.scene.geometries.inclusion import SIDES, Block, Capsule
+from validate.scene.mesh import require_positive_cells
 
 
 def test_paper_mesh_is_the_reconstruction_of_the_science_note() -> None:
@@ -27,7 +27,7 @@ def test_paper_mesh_is_the_reconstruction_of_the_science_note() -> None:
 def test_cells_and_cavity_fill_the_block() -> None:
     mesh = phantom_mesh(PAPER_GRID)
     hole = cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes)
-    assert cell_volumes(mesh).sum() + hole == pytest.approx(np.prod(BLOCK.sizes), rel=1e-12)
+    assert mesh.cell_volumes().sum() + hole == pytest.approx(np.prod(BLOCK.sizes), rel=1e-12)
 
 
 def test_wall_nodes_lie_on_the_capsule_and_faces_on_the_block() -> None:
@@ -81,10 +81,10 @@ def test_off_centre_inclusions_give_positive_cells_and_a_closed_wall(
     x: float, y: float, z: float, radius: float, length: float
 ) -> None:
     capsule = Capsule((x, y, z), radius, length)
-    mesh = block_with_inclusion(BLOCK, PAPER_GRID, capsule)
-    assert cell_volumes(mesh).min() > 0
+    mesh = BLOCK.around(PAPER_GRID, capsule)
+    assert mesh.cell_volumes().min() > 0
     hole = cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes)
-    assert cell_volumes(mesh).sum() + hole == pytest.approx(np.prod(BLOCK.sizes), rel=1e-11)
+    assert mesh.cell_volumes().sum() + hole == pytest.approx(np.prod(BLOCK.sizes), rel=1e-11)
     assert 0.6 * capsule.volume < hole < capsule.volume
 
 
@@ -102,10 +102,10 @@ def test_far_off_inclusions_are_meshed_properly_or_refused(
     """Projection inverts cells for about one in ten of a wide range: never silently."""
     capsule = Capsule((x, y, z), radius, 2 * radius * slender)
     try:
-        mesh = block_with_inclusion(BLOCK, COARSE_GRID, capsule)
+        mesh = BLOCK.around(COARSE_GRID, capsule)
     except SceneError:
         return
-    assert cell_volumes(mesh).min() > 0
+    assert mesh.cell_volumes().min() > 0
     assert cavity_surface(mesh, "cyst", "cavity").volume(mesh.nodes) > 0
 
 
@@ -124,17 +124,17 @@ def test_inclusion_that_reaches_a_face_is_refused(
     centre: tuple[float, float, float], face: str
 ) -> None:
     with pytest.raises(SceneError, match=f"face {face} of the block"):
-        block_with_inclusion(BLOCK, PAPER_GRID, Capsule(centre, 0.0085, 0.028))
+        BLOCK.around(PAPER_GRID, Capsule(centre, 0.0085, 0.028))
 
 
 def test_inclusion_too_near_a_face_for_its_mesh_is_refused() -> None:
     with pytest.raises(SceneError, match=r"shares \d+ nodes with the outer faces"):
-        block_with_inclusion(BLOCK, (9, 5, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.0445))
+        BLOCK.around((9, 5, 15), Capsule((0.03, 0.0225, 0.035), 0.0085, 0.0445))
 
 
 def test_inclusion_smaller_than_an_element_is_refused() -> None:
     with pytest.raises(SceneError, match=r"diameter 1 mm.*23.3 mm"):
-        block_with_inclusion(BLOCK, (4, 4, 4), Capsule((0.03, 0.0225, 0.035), 0.0005, 0.001))
+        BLOCK.around((4, 4, 4), Capsule((0.03, 0.0225, 0.035), 0.0005, 0.001))
 
 
 def test_an_element_counts_as_the_widest_beside_the_inclusion() -> None:
@@ -144,21 +144,21 @@ def test_an_element_counts_as_the_widest_beside_the_inclusion() -> None:
         return Capsule((0.03, 0.0225, 0.040), mm / 2e3, 0.030)
 
     with pytest.raises(SceneError, match=r"diameter 26.6 mm.*26.7 mm"):
-        block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.6))
+        BLOCK.around((4, 4, 4), diameter(26.6))
     with pytest.raises(SceneError, match="no node of"):  # the next rule's words
-        block_with_inclusion(BLOCK, (4, 4, 4), diameter(26.7))
+        BLOCK.around((4, 4, 4), diameter(26.7))
 
 
 def test_inclusion_between_the_nodes_is_refused() -> None:
     """As wide as an element, yet every node is outside."""
     with pytest.raises(SceneError, match=r"\(8, 8, 8\) mesh.* radius 5.2 mm"):
-        block_with_inclusion(BLOCK, (8, 8, 8), Capsule((0.03, 0.0225, 0.035), 0.0052, 0.0104))
+        BLOCK.around((8, 8, 8), Capsule((0.03, 0.0225, 0.035), 0.0052, 0.0104))
 
 
 @pytest.mark.parametrize("grid", [(3, 10, 15), (9, 3, 15), (9, 10, 3)])
 def test_grids_too_coarse_for_a_hole_are_refused(grid: tuple[int, int, int]) -> None:
     with pytest.raises(SceneError, match="at least 4 along each side"):
-        block_with_inclusion(BLOCK, grid, CAPSULE)
+        BLOCK.around(grid, CAPSULE)
 
 
 @pytest.mark.parametrize(("radius", "length"), [(0.0, 0.01), (-1.0, 1.0), (0.006, 0.011)])

@@ -8,15 +8,7 @@ from phantoms import COARSE_GRID, phantom_mesh
 
 from validate.errors import SceneError
 from validate.scene.geometries.specification import quarter_cylinder
-from validate.scene.mesh import (
-    EDGES,
-    Mesh,
-    boundary_facets,
-    cell_volumes,
-    kuhn_cells,
-    quadratic,
-    require_positive_cells,
-)
+from validate.scene.mesh import EDGES, Mesh, boundary_facets, kuhn_cells, require_positive_cells
 
 UNIT_TET = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
@@ -38,13 +30,13 @@ def test_kuhn_split_fills_the_box_with_six_equal_tetrahedra_per_cell(
     mesh = Mesh(grid_nodes(shape), kuhn_cells(shape), "tet4")
     boxes = int(np.prod(np.array(shape) - 1))
     assert len(mesh.cells) == 6 * boxes
-    assert cell_volumes(mesh) == pytest.approx(np.full(6 * boxes, 1 / (6 * boxes)), rel=1e-12)
+    assert mesh.cell_volumes() == pytest.approx(np.full(6 * boxes, 1 / (6 * boxes)), rel=1e-12)
 
 
 def test_kuhn_split_in_the_plane_and_its_diagonal() -> None:
     mesh = Mesh(grid_nodes((3, 4)), kuhn_cells((3, 4)), "tri3")
     assert len(mesh.cells) == 12
-    assert cell_volumes(mesh) == pytest.approx(np.full(12, 1 / 12), rel=1e-12)
+    assert mesh.cell_volumes() == pytest.approx(np.full(12, 1 / 12), rel=1e-12)
     # Every tetrahedron of a box holds its first and last corner: the diagonal (0,0,0)-(1,1,1).
     cells = kuhn_cells((2, 2, 2))
     assert ((cells == 0).any(axis=1) & (cells == 7).any(axis=1)).all()
@@ -74,7 +66,7 @@ def test_boundary_is_closed_and_encloses_the_cells(mesh: Mesh) -> None:
     areas = area_vectors(mesh.nodes, facets)
     assert np.abs(areas.sum(axis=0)).max() < 1e-15 * len(facets)
     enclosed = (mesh.nodes[facets].mean(axis=1) * areas).sum() / 3
-    assert enclosed == pytest.approx(cell_volumes(mesh).sum(), rel=1e-12)
+    assert enclosed == pytest.approx(mesh.cell_volumes().sum(), rel=1e-12)
 
 
 def test_named_sets_are_the_whole_boundary_once() -> None:
@@ -86,7 +78,7 @@ def test_named_sets_are_the_whole_boundary_once() -> None:
 
 def test_quadratic_puts_one_node_in_the_middle_of_every_edge() -> None:
     linear = phantom_mesh(COARSE_GRID)
-    mesh = quadratic(linear)
+    mesh = linear.quadratic()
     n = len(linear.nodes)
     assert (mesh.kind, mesh.order) == ("tet10", 2)
     assert np.array_equal(mesh.nodes[:n], linear.nodes)
@@ -96,11 +88,11 @@ def test_quadratic_puts_one_node_in_the_middle_of_every_edge() -> None:
         assert mesh.nodes[mesh.cells[:, 4 + local]] == pytest.approx(middle, abs=1e-15)
     edges = np.sort(linear.cells[:, list(EDGES[3])].reshape(-1, 2), axis=1)
     assert len(mesh.nodes) == n + len(np.unique(edges, axis=0))
-    assert cell_volumes(mesh) == pytest.approx(cell_volumes(linear), rel=1e-15)
+    assert mesh.cell_volumes() == pytest.approx(linear.cell_volumes(), rel=1e-15)
 
 
 def test_quadratic_facets_carry_their_own_middles() -> None:
-    mesh = quadratic(phantom_mesh(COARSE_GRID))
+    mesh = phantom_mesh(COARSE_GRID).quadratic()
     for facets in mesh.facets.values():
         for local, (i, j) in enumerate(EDGES[2]):
             middle = mesh.nodes[facets[:, [i, j]]].mean(axis=1)
@@ -109,10 +101,10 @@ def test_quadratic_facets_carry_their_own_middles() -> None:
 
 def test_quadratic_in_the_plane_and_twice() -> None:
     square = Mesh(grid_nodes((2, 2)), kuhn_cells((2, 2)), "tri3", {"side": np.array([[0, 1]])})
-    mesh = quadratic(square)
+    mesh = square.quadratic()
     assert mesh.kind == "tri6"
     assert mesh.nodes[mesh.facets["side"][0, 2]] == pytest.approx([0.0, 0.5])
-    assert quadratic(mesh) is mesh
+    assert mesh.quadratic() is mesh
 
 
 def test_inverted_element_is_named_by_its_number_and_volume() -> None:

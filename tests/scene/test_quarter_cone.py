@@ -5,7 +5,7 @@ import pytest
 
 from validate.errors import SceneError
 from validate.scene.geometries.specification import quarter_cone, quarter_cylinder
-from validate.scene.mesh import boundary_facets, cell_volumes, quadratic
+from validate.scene.mesh import boundary_facets
 
 BOTTOM, TOP, HEIGHT = 0.068, 0.058, 0.028
 FRUSTUM = HEIGHT / 3 * (0.034**2 + 0.034 * 0.029 + 0.029**2)  # volume / pi
@@ -21,19 +21,19 @@ def test_volume_is_that_of_the_inscribed_pyramid_frustum(
     """
     mesh = quarter_cone(BOTTOM, TOP, HEIGHT, radial, axial, grading)
     exact = radial * np.sin(np.pi / (4 * radial)) * FRUSTUM
-    assert cell_volumes(mesh).sum() == pytest.approx(exact, rel=1e-12)
-    assert cell_volumes(mesh).min() > 0
+    assert mesh.cell_volumes().sum() == pytest.approx(exact, rel=1e-12)
+    assert mesh.cell_volumes().min() > 0
 
 
 def test_volume_converges_to_the_exact_one_at_second_order() -> None:
-    volumes = [cell_volumes(quarter_cone(BOTTOM, TOP, HEIGHT, n, 2)).sum() for n in (4, 8, 16)]
+    volumes = [quarter_cone(BOTTOM, TOP, HEIGHT, n, 2).cell_volumes().sum() for n in (4, 8, 16)]
     errors = 1 - np.array(volumes) / (np.pi * FRUSTUM / 4)
     assert errors.min() > 0
     assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(2.0, abs=0.02)
 
 
 def test_sets_lie_on_their_surfaces_and_cover_the_boundary() -> None:
-    mesh = quadratic(quarter_cone(BOTTOM, TOP, HEIGHT, 3, 4))
+    mesh = quarter_cone(BOTTOM, TOP, HEIGHT, 3, 4).quadratic()
     vertices = len(quarter_cone(BOTTOM, TOP, HEIGHT, 3, 4).nodes)
     x = {name: mesh.nodes[mesh.facet_nodes(name)] for name in mesh.facets}
     assert np.abs(x["bottom"][:, 2]).max() == 0

@@ -8,7 +8,6 @@ import pytest
 from validate.scene.geometries.box import box
 from validate.scene.geometries.refinement import refined
 from validate.scene.material import Material, Region
-from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Scene
 
 
@@ -20,7 +19,7 @@ def test_a_region_keeps_its_volume_and_place() -> None:
     fine = refined(scene)
     (region,) = fine.regions
     assert len(region.cells) == len(set(region.cells.tolist())) == 8 * len(cells)
-    volumes = [cell_volumes(s.mesh)[s.regions[0].cells].sum() for s in (scene, fine)]
+    volumes = [s.mesh.cell_volumes()[s.regions[0].cells].sum() for s in (scene, fine)]
     assert volumes[1] == pytest.approx(volumes[0], rel=1e-12)
     centres = [
         s.mesh.nodes[s.mesh.corners[s.regions[0].cells]].mean(axis=(0, 1)) for s in (scene, fine)

@@ -13,7 +13,6 @@ from validate.errors import SceneError
 from validate.scene.geometries.box import box
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material, Region
-from validate.scene.mesh import quadratic
 from validate.scene.places import Chosen, Nearest
 from validate.scene.scene import Cavity, Drive, Foundation, Pin, Scene, Support
 from validate.scene.tool import Needle, require_usable
@@ -55,7 +54,7 @@ def test_sets_that_the_mesh_lacks_are_refused(parts: dict[str, tuple[object, ...
 
 def test_nodal_mean_dilatation_needs_linear_elements() -> None:
     with pytest.raises(SceneError, match="use order 1"):
-        phantom_scene(quadratic(phantom_mesh(COARSE_GRID)), dilatation="nodal_mean")
+        phantom_scene(phantom_mesh(COARSE_GRID).quadratic(), dilatation="nodal_mean")
 
 
 @pytest.mark.parametrize("cell", [-1, 10**6])

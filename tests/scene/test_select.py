@@ -12,7 +12,7 @@ from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.geometries.refinement import refined
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.places import InBox, Labelled, Nearest, OnPlane, Site, facets_of, nodes_of
 from validate.scene.scene import Foundation, Load, Mass, Scene, Support
 
@@ -21,9 +21,9 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 FRONT, TOP = OnPlane(SIZE, X), OnPlane(SIZE, (0.0, 0.0, 2.0))
 MESHES = {
     "tet4": box(SIZE, (3, 2, 2)),
-    "tet10": quadratic(box(SIZE, (3, 2, 2))),
+    "tet10": box(SIZE, (3, 2, 2)).quadratic(),
     "hex8": grid(SIZE, (3, 2, 2)),
-    "hex27": quadratic(grid(SIZE, (3, 2, 2))),
+    "hex27": grid(SIZE, (3, 2, 2)).quadratic(),
 }
 
 

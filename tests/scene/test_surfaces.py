@@ -12,7 +12,6 @@ from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.body_facts import quality
 from validate.scene.geometries.box import grid
-from validate.scene.mesh import cell_volumes
 from validate.scene.mesh_files import mesh_file as filled_module
 from validate.scene.mesh_files import surface_arrays
 from validate.scene.mesh_files.mesh_file import filled
@@ -100,7 +99,7 @@ def test_a_surface_with_mixed_normals_is_filled_and_told(tmp_path: Path) -> None
     given = T.copy()
     given[::3] = given[::3, ::-1]
     body = filled(stl(tmp_path / "x.stl", X, given), "mm", 6e-3)
-    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6, rel=1e-3)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(6e-6, rel=1e-3)
     assert body.told["turned"] == "4 of 12 triangles"
     assert quality(body.mesh).min() > 0.05
 
@@ -109,7 +108,7 @@ def test_a_surface_with_mixed_normals_is_filled_and_told(tmp_path: Path) -> None
 def test_a_surface_with_a_void_is_filled_around_it(tmp_path: Path) -> None:
     points, both = np.vstack([X, 0.5 * X]), np.vstack([T, len(X) + T[:, ::-1]])
     body = filled(stl(tmp_path / "x.stl", points, both), "mm", 4e-3)
-    assert cell_volumes(body.mesh).sum() == pytest.approx(6e-6 * (1 - 0.125), rel=0.01)
+    assert body.mesh.cell_volumes().sum() == pytest.approx(6e-6 * (1 - 0.125), rel=0.01)
 
 
 @pytest.mark.slow
@@ -150,7 +149,7 @@ def test_vtk_packed_as_it_offers(kind: str, mode: str, tmp_path: Path) -> None:
             read_foreign(tmp_path / "x.vtu", "mm")
         return
     found = read_foreign(tmp_path / "x.vtu", "mm").mesh
-    assert cell_volumes(found).sum() == pytest.approx(6e-6, rel=1e-6)
+    assert found.cell_volumes().sum() == pytest.approx(6e-6, rel=1e-6)
 
 
 def test_an_edge_below_zero_and_a_body_that_is_none_name_the_file(

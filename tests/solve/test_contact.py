@@ -32,7 +32,6 @@ from validate.scene.contact import (
 )
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.places import OnPlane
 from validate.scene.scene import Drive, Load, Pin, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
@@ -48,7 +47,7 @@ from validate.solve.static.quasi_static import QuasiStatic
 BOX = (0.1, 0.1, 0.1)
 MESHES = {
     "tet4": box(BOX, (2, 2, 2)),
-    "tet10": quadratic(box(BOX, (1, 1, 1))),
+    "tet10": box(BOX, (1, 1, 1)).quadratic(),
     "hex8": grid(BOX, (2, 2, 2)),
 }
 
@@ -137,7 +136,7 @@ def ball(a: float, n: int, ratio: float, far: float, order: int = 1) -> tuple[fl
     """Forces of a ball pressed in by d = a^2/R over Hertz's: by depth, and by the radius of the
     pressures, whose mean r^2 is 2 a^2/5."""
     scene = half_space(RigidSphere((0.0, 0.0, 1.0), 1.0), a, n, ratio, far)
-    system = build(replace(scene, body=quadratic(scene.mesh)) if order == 2 else scene)
+    system = build(replace(scene, body=scene.mesh.quadratic()) if order == 2 else scene)
     stepper = ContactNewton().prepare(system)
     assert isinstance(stepper, ContactStepper)
     state = stepper.step(stepper.rest(), np.array([a**2]))

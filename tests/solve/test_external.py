@@ -367,10 +367,11 @@ def test_a_program_that_is_not_there_is_a_row() -> None:
 def test_the_mesh_is_read_by_another_library(tmp_path: Path, kind: str) -> None:
     meshio = pytest.importorskip("meshio")
     from validate.scene.geometries.box import box
-    from validate.scene.mesh import quadratic
+
+    pass
 
     mesh = grid(SIZE, (1, 2, 2)) if kind == "hex8" else box(SIZE, (1, 2, 2))
-    mesh = quadratic(mesh) if kind == "tet10" else mesh
+    mesh = mesh.quadratic() if kind == "tet10" else mesh
     write_vtu(mesh, tmp_path / "mesh.vtu")
     read = meshio.read(tmp_path / "mesh.vtu")
     assert np.array_equal(read.points, mesh.nodes)

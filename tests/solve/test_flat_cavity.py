@@ -7,7 +7,7 @@ from validate.fem.cavity import cavity_surface, volume_hessian
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, boundary_facets, quadratic
+from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.scene import Cavity, Drive, Scene, Support
 from validate.solve.static.newton import StaticNewton
 
@@ -27,7 +27,7 @@ def holed(order: int) -> Mesh:
     facets = {"y0": number[mesh.facets["y0"]], "y1": number[mesh.facets["y1"]],
               "hole": number[hole]}  # fmt: skip
     whole = Mesh(mesh.nodes[kept], number[cells], "tri3", facets)
-    return quadratic(whole) if order == 2 else whole
+    return whole.quadratic() if order == 2 else whole
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -11,7 +11,7 @@ from validate.errors import SceneError
 from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.places import Labelled, nodes_of
 from validate.scene.scene import Drive, DriveShape, Scene
 from validate.solve.march import run_scheme
@@ -20,7 +20,7 @@ from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.without_mechanics import Harmonic
 
 ALL = reduce(or_, [Labelled(f"{a}{e}") for a in "xyz" for e in (0, 1)]).faces
-MESH = quadratic(grid((1.0, 2.0, 1.5), (2, 2, 2)))
+MESH = grid((1.0, 2.0, 1.5), (2, 2, 2)).quadratic()
 ONE = np.array([1.0])
 
 

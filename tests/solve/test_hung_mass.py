@@ -10,7 +10,6 @@ from validate.fem.critical import Modes
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.places import InBox, Nearest, OnPlane
 from validate.scene.scene import Load, Mass, Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
@@ -131,7 +130,7 @@ def test_energy_is_kept_with_a_mass() -> None:
 def beam(hung: float) -> Scene:
     """A slender strip in plane stress, 1 m by 5 cm, held at its left end."""
     return Scene(
-        quadratic(box((1.0, 0.05), (20, 2))),
+        box((1.0, 0.05), (20, 2)).quadratic(),
         Material(1e7, 0.3, rho=RHO),
         (Support("x0", (0, 1)),),
         loads=(Load("pull", "x1", (0.0, 1.0)),),

@@ -13,7 +13,6 @@ from validate.errors import SceneError
 from validate.fem.laws.law import law_of
 from validate.fem.system import build
 from validate.scene.material import Material
-from validate.scene.rubber import mooney_rivlin
 from validate.scene.scene import Dilatation
 from validate.solve.fluid.cavities import ExactPressure, NoFluid
 from validate.solve.march import march
@@ -87,7 +86,7 @@ def test_every_law_between_slipping_plates(name: str) -> None:
 
 
 def test_a_stretch_beyond_the_stated_ones_is_an_outcome() -> None:
-    card = mooney_rivlin(4e3, 1e3, 0.4, stretches=(0.7, 1.2))
+    card = Material.mooney_rivlin(4e3, 1e3, 0.4, stretches=(0.7, 1.2))
     stepper = prepared(replace(cube("svk", n=3), material=card))
     assert at(stepper, stepper.rest(), 0.25 * SIDE).failure is None
     for d, words in ((0.35, "is below 0.700; last good"), (-0.25, "is above 1.200")):

@@ -14,7 +14,6 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName, Material, Region
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Dilatation, Drive, Load, Scene, Support, Weight
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.march import march
@@ -32,7 +31,7 @@ def beam(
     mesh = grid(SIZE, (6, 2, 2)) if kind == "hex8" else grid(SIZE, (3, 2, 2))
     mesh = box(SIZE, (4, 2, 2)) if kind.startswith("tet") else mesh
     scene = Scene(
-        mesh if kind in ("hex8", "tet4") else quadratic(mesh),
+        mesh if kind in ("hex8", "tet4") else mesh.quadratic(),
         Material(263_824.0, nu, law, 1070.0),
         (Support("x0", (0, 1, 2)),),
         loads=(Weight("gravity", (0.0, 0.0, -1.0)), Load("tip", "x1", (0.0, 0.0, -1.0))),

@@ -17,7 +17,6 @@ from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Load, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.dynamic.modal import Modal
@@ -117,7 +116,7 @@ def test_linear_dynamics_build_no_tangent_and_run_no_pressure_code(
 
 def test_a_quadratic_body_without_mass_damping_is_lumped_without_a_warning() -> None:
     scene = block(replace(DENSE, stiffness_damping=0.0))
-    stepped(ExplicitLinear(1e-4), replace(scene, body=quadratic(scene.mesh)), 0.01)
+    stepped(ExplicitLinear(1e-4), replace(scene, body=scene.mesh.quadratic()), 0.01)
 
 
 def test_an_explicit_step_at_large_strain_makes_neither_stiffness_nor_tangent(

@@ -19,7 +19,6 @@ from validate.fem.laws.viscoelasticity import cell_branches
 from validate.fem.system import System, build
 from validate.scene.geometries.box import grid
 from validate.scene.material import Prony, Region
-from validate.scene.mesh import quadratic
 from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Dilatation, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
@@ -56,7 +55,7 @@ CASES: list[tuple[str, Dilatation]] = [
 def test_a_light_body_follows_the_material_point(law: str, dilatation: Dilatation) -> None:
     """Uniaxial compression in 25 steps: no inertia to speak of, the same recursion, one curve."""
     scene = pressed(law).scene
-    mesh = quadratic(scene.mesh) if dilatation == "mixed" else scene.mesh
+    mesh = scene.mesh.quadratic() if dilatation == "mixed" else scene.mesh
     system = relaxing(build(replace(scene, body=mesh, dilatation=dilatation)), rho=1e-6)
     dt, depths = 0.02, rise(25, 0.02)
     scheme = NewtonDynamics(dt, "backward_euler", "consistent")

@@ -10,7 +10,7 @@ import pytest
 
 from validate.compare.published import Published
 from validate.report.stored.store import figure_members
-from validate.report.stored.tables import open_store
+from validate.report.stored.tables import StoredTables
 from validate.study.stored_runs.published_page import write_published
 from validate.study.stored_runs.summary import stored_runs
 
@@ -97,7 +97,7 @@ def test_without_a_printed_figure_there_is_no_page(tmp_path: Path) -> None:
 def test_the_page_is_no_run(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     write_published(tmp_path, [entry("bar", figure("drop", 1.0, 1.0))])
     assert stored_runs(tmp_path) == ()
-    assert list(open_store(tmp_path)) == []
+    assert list(StoredTables.open(tmp_path)) == []
     assert not caplog.messages
 
 

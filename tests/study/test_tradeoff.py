@@ -26,7 +26,6 @@ from validate.pipeline.ladder.ladder import RUNGS, LawPair, Rival, Rung, Trial
 from validate.pipeline.run.job import Job
 from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Drive, Load, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.dynamic.modal import Modal
@@ -62,7 +61,7 @@ def block(element: str, level: int, law: LawName) -> Scene:
     """A block that is pulled, in level^3 boxes."""
     mesh = box((0.1, 0.1, 0.1), (level, level, level))
     return Scene(
-        quadratic(mesh) if element == "P2" else mesh,
+        mesh.quadratic() if element == "P2" else mesh,
         Material(4e3, 0.3, law, rho=1000.0, mass_damping=2.0, stiffness_damping=1e-3),
         (Support("z0", (0, 1, 2)),),
         loads=(Load("pull", "z1", (0.0, 0.0, 1.0)),),

@@ -14,7 +14,6 @@ from validate.recording.types import Recording, Source
 from validate.scene.geometries.box import grid
 from validate.scene.geometries.refinement import of_element
 from validate.scene.material import Material
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.study.tradeoff.cell import TradeCell, keyed, run_cell, with_simulators
 
@@ -66,5 +65,5 @@ def test_cells_of_internal_solvers_do_not_depend_on_simulators() -> None:
 
 
 def test_linear_hexahedra_are_linear() -> None:
-    scene = Scene(quadratic(grid((1.0, 1.0, 1.0), (1, 1, 1))), Material(1.0, 0.3))
+    scene = Scene(grid((1.0, 1.0, 1.0), (1, 1, 1)).quadratic(), Material(1.0, 0.3))
     assert of_element(scene, "H8").mesh.kind == "hex8"

@@ -13,12 +13,12 @@ from study_samples import experiment_file
 from validate.engine.cell import Where
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.kalman.formulas import Gaussian, kf_update
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Contours
-from validate.register.outlines.outlines import observe_outlines
+from validate.register.outlines.outlines import OutlineObservation
 from validate.register.outlines.plane import SurfaceSampler
 from validate.scene.geometries.box import box
 from validate.study.filters.cell import folds_of, run_cell
@@ -55,7 +55,7 @@ def test_samples_are_counted_in_their_own_segments_and_none_at_rest() -> None:
 
 def tracks(z: np.ndarray, rest: np.ndarray) -> MarkerTracks:  # type: ignore[type-arg]
     names = tuple("abc"[: z.shape[1]])
-    return MarkerTracks(names, np.arange(1.0, len(z) + 1), z, rest, barycentric_rows(CUBE, rest))
+    return MarkerTracks(names, np.arange(1.0, len(z) + 1), z, rest, Rows.barycentric(CUBE, rest))
 
 
 def test_the_error_of_a_marker_is_its_distance_where_it_was_seen() -> None:
@@ -124,7 +124,7 @@ def test_an_outline_moves_along_its_normals_as_the_wall_does() -> None:
     middle, by = np.array([0.5, 0.5]), 1e-3
     outlines = (edge, middle + (1 + by) * (edge - middle))
     contours = Contours(np.array([0.0, 1.0]), outlines, 1e-5, pose, "body")
-    found = observe_outlines(contours, wall, 0.0).along_normals(8)
+    found = OutlineObservation.of(contours, wall, 0.0).along_normals(8)
     u = by * (mesh.nodes - np.array([0.5, 0.5, 0.4]))
     sides_alone = np.abs(found.normals).max(axis=1) > 0.99  # at a corner no normal is the side's
     assert sides_alone.sum() >= 4

@@ -12,7 +12,7 @@ from validate.fem.system import build
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording
-from validate.register.markers.markers import placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
@@ -54,14 +54,14 @@ def made(camera: Camera, at: Points | None = None) -> Recording:
 
 
 def displacement(recording: Recording, name: str) -> Floats:
-    seen = placed_markers(recording, MESH)
+    seen = MarkerObservation.placed(recording, MESH)
     j = seen.names.index(name)
     return np.asarray(seen.x[:, j] - seen.rest[j])
 
 
 def test_an_exact_camera_gives_back_the_displacements() -> None:
     at, recording = points(), made(Camera(0.0, every=5))
-    seen = placed_markers(recording, MESH)
+    seen = MarkerObservation.placed(recording, MESH)
     assert seen.t == pytest.approx(np.arange(81) * 0.005)
     assert recording.markers["markers"].frame == "camera"
     assert np.abs(recording.markers["markers"].x[0] - seen.rest).max() > 0.1  # a frame of its own
@@ -104,7 +104,7 @@ def test_missing_looks_are_counted_and_never_the_first() -> None:
     assert seen[0].all()
     assert (seen.all(axis=2) == seen.any(axis=2)).all()  # a point is unseen as a whole
     assert 1 - seen[1:].mean() == pytest.approx(0.1, abs=0.02)  # 2400 looks
-    assert placed_markers(made(Camera(1e-5, missing=0.1)), MESH).x.shape == (401, 6, 3)
+    assert MarkerObservation.placed(made(Camera(1e-5, missing=0.1)), MESH).x.shape == (401, 6, 3)
 
 
 def test_streams_are_apart_and_seeded() -> None:
@@ -118,7 +118,7 @@ def test_streams_are_apart_and_seeded() -> None:
 
 def test_a_registration_is_as_good_as_the_still_looks() -> None:
     """Fitted on 100 looks, A's error from registration is a tenth of a look's noise."""
-    seen = placed_markers(made(Camera(2e-5)), MESH)
+    seen = MarkerObservation.placed(made(Camera(2e-5)), MESH)
     assert float(seen.tre.max()) < 1e-5
     truth = np.vstack([np.zeros(3), points().u[:, 0]])
     error = displacement(made(Camera(2e-5)), "A") - truth
@@ -145,8 +145,8 @@ def test_it_survives_a_file(tmp_path: Path) -> None:
     assert mine.names == theirs.names
     assert read.record("provenance")["same_model"] == "true"
     assert read.record("provenance")["element"] == "P1"
-    assert placed_markers(read, MESH).x == pytest.approx(
-        placed_markers(recording, MESH).x, nan_ok=True
+    assert MarkerObservation.placed(read, MESH).x == pytest.approx(
+        MarkerObservation.placed(recording, MESH).x, nan_ok=True
     )
 
 
@@ -175,11 +175,13 @@ def test_a_planar_set_is_placed_by_its_up() -> None:
     flat = {k: np.array([*p, 0.1]) for k, p in flat.items()}
     at = replace(points(), names=("B",), rest=REST[1:], u=points().u[:, 1:])
     recording = record_tracked(ORIGIN, at, flat, Camera(0.0), {})
-    seen = placed_markers(recording, MESH)
+    seen = MarkerObservation.placed(recording, MESH)
     assert seen.x[200, 0] - seen.rest[0] == pytest.approx(at.u[199, 0], abs=1e-14)
     down = {"up": " ".join(str(-float(v)) for v in recording.record("camera")["up"].split())}
     with pytest.raises(RegistrationError, match="mirrored"):
-        placed_markers(replace(recording, metadata={**recording.metadata, "camera": down}), MESH)
+        MarkerObservation.placed(
+            replace(recording, metadata={**recording.metadata, "camera": down}), MESH
+        )
 
 
 @pytest.mark.parametrize(
@@ -201,7 +203,7 @@ def test_records_that_are_no_vectors_are_refused() -> None:
     recording = made(Camera(0.0))
     spoilt = {**recording.metadata, "camera": {"up": "0 1"}}
     with pytest.raises(RegistrationError, match="'up' is '0 1': expected"):
-        placed_markers(replace(recording, metadata=spoilt), MESH)
+        MarkerObservation.placed(replace(recording, metadata=spoilt), MESH)
 
 
 def test_mistaken_looks_are_as_many_and_as_far_off_as_declared() -> None:
@@ -221,8 +223,8 @@ def test_a_late_look_sees_the_motion_of_its_own_time_and_says_how_sure_it_is() -
     assert off[20:-20, 0].std() == pytest.approx(2e-5, rel=0.15)
     assert np.abs(off[:, 1:]).max() < 1e-12
     assert np.abs(late.markers["markers"].x[:, 2:] - exact.markers["markers"].x[:, 2:]).max() == 0
-    assert placed_markers(late, MESH).sd_t == 2e-3
-    assert placed_markers(exact, MESH).sd_t == 0.0
+    assert MarkerObservation.placed(late, MESH).sd_t == 2e-3
+    assert MarkerObservation.placed(exact, MESH).sd_t == 0.0
 
 
 @pytest.mark.parametrize("wrong", [{"outliers": 1.0}, {"astray": 0.0}, {"late": -1.0}])

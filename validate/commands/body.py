@@ -8,7 +8,7 @@ from validate.commands.display import say, table
 from validate.errors import SceneError, UsageError
 from validate.places import try_file
 from validate.scene.body_facts import POOR, SAME, facts, largest_side, odd_size, quality
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
 from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.meshio_arrays import SURFACE
@@ -46,7 +46,7 @@ def body(
         name: facets_of(found.mesh, place_of(words, found.mesh)) for name, words in places.items()
     }
     mesh = replace(found.mesh, facets={**found.mesh.facets, **chosen})
-    mesh = quadratic(mesh) if curved else mesh
+    mesh = mesh.quadratic() if curved else mesh
     say(str(file), "bold")
     table("", ["of the body", "what"], [[k, v] for k, v in {**facts(mesh), **found.told}.items()])
     worst = quality(mesh)

@@ -3,10 +3,7 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "residual": (
-        "Residual",
-        "residuals",
-    ),
+    "residual": ("Residual",),
     "convergence": (
         "GridConvergence",
         "Numerical",
@@ -34,15 +31,9 @@ _HOMES = {
         "Sensor",
     ),
     "shapes.two_fields": ("compare_fields",),
-    "force_error": (
-        "force_pair",
-        "force_scores",
-    ),
+    "force_error": ("ForcePair",),
     "shapes.pair": ("outline_boundary",),
-    "shapes.shape_error": (
-        "Boundaries",
-        "boundary_scores",
-    ),
+    "shapes.shape_error": ("Boundaries",),
     "overall_verdict": (
         "Overall",
         "judge_all",

@@ -8,6 +8,7 @@ reference; the paper does not print its normaliser.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -132,30 +133,32 @@ class ForcePair:
         error = self.y - self.y_reference
         return TrackError(self.name, "force", error, float(np.ptp(self.y_reference)))
 
+    def scores(self) -> tuple[Score, ...]:
+        """Scores `<name>.<metric>` of the self."""
+        return tuple(metric.score(self, f"{self.name}.") for metric in FORCE_METRICS)
 
-def force_pair(
-    name: str, run: Signal, reference: Signal, lag_within: float, against: str
-) -> ForcePair:
-    """Return the run interpolated at the reference's times that it meets, gaps excluded.
+    @classmethod
+    def of(cls, name: str, run: Signal, reference: Signal, lag_within: float, against: str) -> Self:
+        """Return the run interpolated at the reference's times that it meets, gaps excluded.
 
-    Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
-    """
-    if run.unit != reference.unit or run.y.shape[1] != 1 or reference.y.shape[1] != 1:
-        raise ComparisonError(
-            f"{name}: {run.y.shape[1]} columns in {run.unit} against {reference.y.shape[1]} in "
-            f"{reference.unit}; choose one column each in one unit"
-        )
-    if lag_within <= 0:
-        raise ComparisonError(f"{name}: lags within {lag_within:g} s; expected a positive time")
-    seen = met(run.t, reference.t) if len(run.t) > 1 else np.zeros(len(reference.t), dtype=bool)
-    if seen.sum() < MIN_MATCHED:
-        raise ComparisonError(
-            f"{name}: {int(seen.sum())} of {len(reference.t)} reference samples lie within the "
-            f"run, at least {MIN_MATCHED} are needed; check the clocks"
-        )
-    t = reference.t[seen]
-    y = np.interp(t, run.t, run.y[:, 0])
-    return ForcePair(name, t, y, reference.y[seen, 0], run, reference, lag_within, against)
+        Raises `ComparisonError` for different units, several columns, or fewer than 10 met samples.
+        """
+        if run.unit != reference.unit or run.y.shape[1] != 1 or reference.y.shape[1] != 1:
+            raise ComparisonError(
+                f"{name}: {run.y.shape[1]} columns in {run.unit} against {reference.y.shape[1]} in "
+                f"{reference.unit}; choose one column each in one unit"
+            )
+        if lag_within <= 0:
+            raise ComparisonError(f"{name}: lags within {lag_within:g} s; expected a positive time")
+        seen = met(run.t, reference.t) if len(run.t) > 1 else np.zeros(len(reference.t), dtype=bool)
+        if seen.sum() < MIN_MATCHED:
+            raise ComparisonError(
+                f"{name}: {int(seen.sum())} of {len(reference.t)} reference samples lie within the "
+                f"run, at least {MIN_MATCHED} are needed; check the clocks"
+            )
+        t = reference.t[seen]
+        y = np.interp(t, run.t, run.y[:, 0])
+        return cls(name, t, y, reference.y[seen, 0], run, reference, lag_within, against)
 
 
 def peak_error(force: ForcePair) -> float:
@@ -247,8 +250,3 @@ FORCE_METRICS: tuple[Metric[ForcePair], ...] = (
         for name, value, unit, words in TRACK_METRICS
     ),
 )
-
-
-def force_scores(force: ForcePair) -> tuple[Score, ...]:
-    """Scores `<name>.<metric>` of the force."""
-    return tuple(metric.score(force, f"{force.name}.") for metric in FORCE_METRICS)

@@ -73,22 +73,22 @@ class Residual:
     def count(self) -> int:
         return len(self.values)
 
+    @classmethod
+    def of(cls, registered: Registered, run: Run) -> tuple[Residual, ...]:
+        """Every observation at every selection, and the volume of every cavity there.
 
-def residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:
-    """Every observation at every selection, and the volume of every cavity there.
-
-    None for a run that did not reach the last input: it has no error over the whole.
-    Raises `ComparisonError` when nothing matches in time.
-    """
-    if not reached_end(registered, run):
-        return ()
-    found: list[Residual] = []
-    for selection in registered.selections:
-        for seen in registered.compared:
-            if seen.name in (selection.of or (seen.name,)):
-                found += [_of(d, selection, seen.role) for d in seen.deviations(run, selection)]
-        found += [_of(d, selection, "validates") for d in _volumes(run, selection)]
-    return tuple(found)
+        None for a run that did not reach the last input: it has no error over the whole.
+        Raises `ComparisonError` when nothing matches in time.
+        """
+        if not reached_end(registered, run):
+            return ()
+        found: list[Residual] = []
+        for selection in registered.selections:
+            for seen in registered.compared:
+                if seen.name in (selection.of or (seen.name,)):
+                    found += [_of(d, selection, seen.role) for d in seen.deviations(run, selection)]
+            found += [_of(d, selection, "validates") for d in _volumes(run, selection)]
+        return tuple(found)
 
 
 def rest_residuals(registered: Registered, run: Run) -> tuple[Residual, ...]:

@@ -117,6 +117,33 @@ class Measurements:
             )
         return together(found)
 
+    def timetable(self, dt: float) -> "Timetable":
+        """Land every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
+
+        Raises `ComparisonError` when one lies further off than a hundredth of a step (here a
+        measurement is not interpolated) or two share a step.
+        """
+        t = self.t
+        steps, off = _nearest(t, dt)
+        if off.max() > OFF_STEP:
+            i = int(off.argmax())
+            # The largest step up to `dt` on which all times land, as advice
+            step = _landed(t, dt)
+            landing = "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
+            raise ComparisonError(
+                f"measurement at t = {t[i]:g} s lies {off[i]:.2g} steps of {dt:g} s off its "
+                f"nearest step; {landing}"
+            )
+        if len(np.unique(steps)) < len(steps):
+            raise ComparisonError(
+                f"{len(steps)} measurements lie on {len(np.unique(steps))} steps of {dt:g} s; "
+                f"choose a step of at most {np.diff(t).min():g} s"
+            )
+        seen = np.isfinite(self.z).any(axis=1) & (steps > 0)
+        rows = {int(steps[i]): self.z[i] for i in np.flatnonzero(seen)}
+        later = steps > 0
+        return Timetable(MappingProxyType(rows), int((~later).sum()), int(later.sum()) - len(rows))
+
 
 @dataclass(frozen=True)
 class Timetable:
@@ -152,34 +179,6 @@ class Timetable:
             f"0 of {total} measurements reached the filter ({told}), so the model ran without "
             "corrections; compare it with a method without markers"
         )
-
-
-def timetable(measurements: Measurements, dt: float) -> Timetable:
-    """Land every measurement on the nearest of the steps at k dt s; rows all NaN are left out.
-
-    Raises `ComparisonError` when one lies further off than a hundredth of a step (here a
-    measurement is not interpolated) or two share a step.
-    """
-    t = measurements.t
-    steps, off = _nearest(t, dt)
-    if off.max() > OFF_STEP:
-        i = int(off.argmax())
-        # The largest step up to `dt` on which all times land, as advice
-        step = _landed(t, dt)
-        landing = "no step matches all of them" if step is None else f"take dt = {step:.6g} s"
-        raise ComparisonError(
-            f"measurement at t = {t[i]:g} s lies {off[i]:.2g} steps of {dt:g} s off its nearest "
-            f"step; {landing}"
-        )
-    if len(np.unique(steps)) < len(steps):
-        raise ComparisonError(
-            f"{len(steps)} measurements lie on {len(np.unique(steps))} steps of {dt:g} s; "
-            f"choose a step of at most {np.diff(t).min():g} s"
-        )
-    seen = np.isfinite(measurements.z).any(axis=1) & (steps > 0)
-    rows = {int(steps[i]): measurements.z[i] for i in np.flatnonzero(seen)}
-    later = steps > 0
-    return Timetable(MappingProxyType(rows), int((~later).sum()), int(later.sum()) - len(rows))
 
 
 def _nearest(t: Floats, dt: float) -> tuple[Ints, Floats]:

@@ -11,7 +11,6 @@ from validate.pipeline.ladder.ladder import Trial
 from validate.pipeline.ladder.references import ORDERS, exact_in_time, swinging_pair
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName
-from validate.scene.mesh import quadratic
 from validate.scene.scene import Scene
 from validate.solve.schemes import candidates
 from validate.solve.study_entries import SwingingBody
@@ -38,7 +37,7 @@ def swinging_trial(
         cells = tuple(n * level for n in per)
         mesh = grid(size, cells) if element == "H8" else box(size, cells)
         # P2's midside nodes are as many nodes as P1 has at twice the level.
-        mesh = quadratic(mesh) if element == "P2" else mesh
+        mesh = mesh.quadratic() if element == "P2" else mesh
         return with_law(replace(base, body=mesh), law)
 
     fine = (2, 4) if quick else (2, 4, 8)

@@ -7,12 +7,12 @@ millimetres in messages. Fit on the rest state once, then freeze.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "markers.quality": ("Registration", "register_points"),
+    "markers.quality": ("Registration",),
     "markers.transform": ("Similarity", "fit_similarity", "fit_two_step"),
     "registration": ("Registered",),
     "observation": ("Deviation", "Observation", "Selection"),
-    "markers.markers": ("MarkerObservation", "observe_markers"),
-    "outlines.outlines": ("OutlineObservation", "observe_outlines"),
+    "markers.markers": ("MarkerObservation",),
+    "outlines.outlines": ("OutlineObservation",),
     "sensing": ("ForceSensing", "LengthSensing", "PoseShift", "PressureSensing", "Sensing"),
     "signals": ("SignalObservation",),
 }

@@ -14,10 +14,10 @@ from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.markers import placed_markers
+from validate.register.markers.markers import MarkerObservation
 from validate.register.observation import Observation
 from validate.register.registration import Registered
-from validate.register.signals import SignalObservation, driving, validating
+from validate.register.signals import SignalObservation
 from validate.scene.contact import RigidContact
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Load, Pressure, Scene, Weight
@@ -30,8 +30,8 @@ def follow_signal(
 ) -> Registered:
     """Step through `signal` after t = 0, where everything is at rest, with the tracked markers
     placed by the recording's own records."""
-    drive = driving(recording, signal, unit, after_rest=True)
-    return Registered((drive, placed_markers(recording, mesh, how=how)))
+    drive = SignalObservation.driving(recording, signal, unit, after_rest=True)
+    return Registered((drive, MarkerObservation.placed(recording, mesh, how=how)))
 
 
 # -------------------------------------------------------------------------------------------------
@@ -46,7 +46,8 @@ def as_declared(recording: Recording, scene: Scene, how: MarkerFit = MarkerFit()
     the recording is predicted."""
     parts: tuple[Any, ...] = (*scene.drives, *scene.loads, *scene.movers)
     recorded = {
-        part.name: driving(recording, _known(part.name, recording), _UNITS[type(part)],
+        part.name: SignalObservation.driving(recording, _known(part.name, recording),
+        _UNITS[type(part)],
                            after_rest=True)
         for part in parts if isinstance(part, RigidContact) or part.value is None
     }  # fmt: skip
@@ -55,9 +56,12 @@ def as_declared(recording: Recording, scene: Scene, how: MarkerFit = MarkerFit()
     moved: tuple[Any, ...] = (*scene.drives, *scene.movers)
     forces = [name for d in moved if (name := f"{d.name}.force") in recording.signals]
     seen: list[Observation] = [
-        validating(recording, name, "N", quantity=name, trace=name) for name in forces
+        SignalObservation.validating(recording, name, "N", quantity=name, trace=name)
+        for name in forces
     ]
-    seen += [placed_markers(recording, scene.mesh, topic=k, how=how) for k in recording.markers]
+    seen += [
+        MarkerObservation.placed(recording, scene.mesh, topic=k, how=how) for k in recording.markers
+    ]
     if not seen:
         raise RegistrationError(
             "the recording has nothing that this scene predicts: neither markers, nor a signal "

@@ -6,6 +6,7 @@ of one curve differ a hundredfold: an absolute error would be that of the last f
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -111,26 +112,26 @@ class SignalObservation:
     def rows(self) -> Rows | None:
         return None
 
+    @classmethod
+    def driving(
+        cls, recording: Recording, name: str, unit: str, *, after_rest: bool = False
+    ) -> Self:
+        """Return the signal that drives, in `unit`; `after_rest` begins after t = 0, where all is
+        at rest."""
+        s = recording.signal(name, unit)
+        kept = s.t > 0 if after_rest else np.ones(len(s.t), bool)
+        sd_t = clock_sd(recording, name)
+        return cls(name, "drives", s.t[kept], s.y[kept], s.unit, s.sd, sd_t=sd_t)
 
-def driving(
-    recording: Recording, name: str, unit: str, *, after_rest: bool = False
-) -> SignalObservation:
-    """Return the signal that drives, in `unit`; `after_rest` begins after t = 0, where all is at
-    rest."""
-    s = recording.signal(name, unit)
-    kept = s.t > 0 if after_rest else np.ones(len(s.t), bool)
-    sd_t = clock_sd(recording, name)
-    return SignalObservation(name, "drives", s.t[kept], s.y[kept], s.unit, s.sd, sd_t=sd_t)
-
-
-def validating(
-    recording: Recording, name: str, unit: str, *, quantity: str, trace: str
-) -> SignalObservation:
-    """Return the signal that a run's `trace` must predict, scored as `quantity`; a mean of repeats
-    is uncertain by their scatter."""
-    s = recording.signal(name, unit)
-    sd_t, share = clock_sd(recording, name), repeats_share(recording)
-    return SignalObservation(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t, share)
+    @classmethod
+    def validating(
+        cls, recording: Recording, name: str, unit: str, *, quantity: str, trace: str
+    ) -> Self:
+        """Return the signal that a run's `trace` must predict, scored as `quantity`; a mean of
+        repeats is uncertain by their scatter."""
+        s = recording.signal(name, unit)
+        sd_t, share = clock_sd(recording, name), repeats_share(recording)
+        return cls(name, "validates", s.t, s.y, unit, s.sd, quantity, trace, sd_t, share)
 
 
 def require_rising(drive: SignalObservation, seen: SignalObservation) -> None:

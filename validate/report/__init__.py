@@ -11,7 +11,7 @@ from validate.exports import lazily, names
 _HOMES = {
     "write": ("write_report",),
     "stored.store": ("document", "schema"),
-    "stored.tables": ("open_store",),
+    "stored.tables": ("StoredTables",),
     "export.fields": ("open_fields",),
     "views.standard": ("VIEWS", "View"),
     "long_table": ("LongRow", "RowBlock"),

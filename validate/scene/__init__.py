@@ -3,7 +3,7 @@
 from validate.exports import lazily, names
 
 _HOMES = {
-    "mesh": ("Mesh", "quadratic"),
+    "mesh": ("Mesh",),
     "mesh_files.mesh_file": ("filled", "read_mesh", "write_mesh"),
     "mesh_files.third_party_meshes": ("ForeignBody", "read_foreign"),
     "scene": (
@@ -22,13 +22,12 @@ _HOMES = {
         "Weight",
     ),
     "material": ("Material", "Region", "Prony"),
-    "rubber": ("mooney_rivlin", "ogden", "yeoh"),
     "laws": ("Coefficients",),
     "meshless": ("MaterialPoint", "RigidBody"),
     "geometries.box": ("grid",),
     "contact": ("RigidContact", "RigidCylinder", "RigidPlane", "RigidPunch", "RigidSphere"),
     "geometries.specification": ("quarter_cylinder",),
-    "geometries.inclusion": ("Block", "Capsule", "block_with_inclusion"),
+    "geometries.inclusion": ("Block", "Capsule"),
     "geometries.refinement": ("refined",),
     "places": ("InBox", "Labelled", "Nearest", "OnPlane", "Site"),
 }

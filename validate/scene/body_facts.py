@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from validate.arrays import Floats
-from validate.scene.mesh import Mesh, cell_volumes
+from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.third_party_meshes import pieces
 from validate.scene.shape_functions import CORNERS, brick_rule
 from validate.units import in_si
@@ -30,7 +30,7 @@ def quality(mesh: Mesh) -> Floats:
     d = mesh.dimension
     pairs = [(a, b) for b in range(d + 1) for a in range(b)]
     squares = sum(((x[:, a] - x[:, b]) ** 2).sum(axis=1) for a, b in pairs)
-    size = np.abs(cell_volumes(mesh))
+    size = np.abs(mesh.cell_volumes())
     if d == 2:
         return np.asarray(4 * np.sqrt(3) * size / squares)
     return np.asarray(12 * (3 * size) ** (2 / 3) / squares)
@@ -59,7 +59,7 @@ def _box(sides: Floats) -> str:
 
 def facts(mesh: Mesh) -> Mapping[str, str]:
     """Counts, box, volume, quality and facet sets, in words with units."""
-    volumes, q = cell_volumes(mesh), quality(mesh)
+    volumes, q = mesh.cell_volumes(), quality(mesh)
     low, high = 1e3 * mesh.nodes.min(axis=0), 1e3 * mesh.nodes.max(axis=0)
     low = np.where(np.abs(low) < _ROUNDING * np.ptp(mesh.nodes), 0.0, low)
     box = " x ".join(f"{b - a:.4g}" for a, b in zip(low, high, strict=True))

@@ -1,14 +1,14 @@
 """Material: isotropic elasticity, damping, density, and the law at large strain."""
 
 from dataclasses import MISSING, dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 
 from validate.arrays import Ints
 from validate.errors import SceneError
 from validate.parameters import part, quantity, take_units
-from validate.scene.laws import Coefficients, further_laws, law_kind, require_stable
+from validate.scene.laws import Coefficients, VolumetricName, further_laws, law_kind, require_stable
 
 # --- Viscoelasticity as a Prony series: how the isochoric stress of a law relaxes.
 
@@ -141,6 +141,62 @@ class Material:
     def assembled_bulk_modulus(self) -> float:
         """kappa Pa; at nu = 0.5 the finite penalty that is assembled beside unknown pressures."""
         return _PENALTY * self.shear_modulus if self.incompressible else self.bulk_modulus
+
+    # --- published rubber: coefficients of papers and handbooks; incompressible sources are met by
+    # nu up to .4999.
+
+    @classmethod
+    def mooney_rivlin(
+        cls, C10: float, C01: float, nu: float, volumetric: VolumetricName = "split", **more: Any
+    ) -> Self:
+        """C10, C01 Pa of I1 - 3 and I2 - 3 (Mooney 1940; Rivlin 1948): mu = 2 (C10 + C01)."""
+        return cls._rubber(
+            "mooney_rivlin", 2 * (C10 + C01), nu, Coefficients(C01=C01), volumetric, more
+        )
+
+    @classmethod
+    def yeoh(
+        cls,
+        C10: float,
+        C20: float,
+        C30: float,
+        nu: float,
+        volumetric: VolumetricName = "split",
+        **more: Any,
+    ) -> Self:
+        """C10, C20, C30 Pa of the powers of I1 - 3 (Yeoh 1993): mu = 2 C10."""
+        return cls._rubber("yeoh", 2 * C10, nu, Coefficients(C20=C20, C30=C30), volumetric, more)
+
+    @classmethod
+    def ogden(
+        cls,
+        mu: tuple[float, ...],
+        alpha: tuple[float, ...],
+        nu: float,
+        volumetric: VolumetricName = "split",
+        **more: Any,
+    ) -> Self:
+        """Terms mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), mu_p Pa (Ogden 1972): the
+        shear modulus is sum mu_p alpha_p / 2. Codes that write 2 mu_p/alpha_p^2 print mu_p
+        alpha_p / 2.
+
+        Raises `SceneError` for another number of moduli than of powers.
+        """
+        if len(mu) != len(alpha) or not mu:
+            raise SceneError(f"Ogden: {len(mu)} moduli for {len(alpha)} powers; give one for each")
+        shear = sum(m * a for m, a in zip(mu, alpha, strict=True)) / 2
+        more_terms = Coefficients(ogden_mu=tuple(mu[1:]), ogden_alpha=tuple(alpha))
+        return cls._rubber("ogden", shear, nu, more_terms, volumetric, more)
+
+    @classmethod
+    def _rubber(
+        cls, law: LawName, shear: float, nu: float, known: Coefficients, form: VolumetricName,
+        more: dict[str, Any],
+    ) -> Self:  # fmt: skip
+        """`more`: other fields of `Material`, and `stretches` of its coefficients."""
+        stretches = more.pop("stretches", known.stretches)
+        coefficients = replace(known, volumetric=form, stretches=stretches)
+        return cls(2 * shear * (1 + nu), nu, law, coefficients=coefficients, **more)
 
 
 @dataclass(frozen=True, eq=False)

@@ -148,15 +148,44 @@ class Mesh:
     def nearest_node(self, point: Floats) -> int:
         return int(np.argmin(np.linalg.norm(self.nodes - point, axis=1)))
 
+    def cell_volumes(self) -> Floats:
+        """Signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by
+        quadrature."""
+        x = self.nodes[self.corners]
+        if self.bricks:
+            rule = brick_rule(*gauss_points(self.dimension, 2))
+            return np.asarray(np.linalg.det(rule.jacobians(x)) @ rule.weights)
+        size = {2: 2.0, 3: 6.0}[self.dimension]
+        return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
 
-def cell_volumes(mesh: Mesh) -> Floats:
-    """Signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by quadrature."""
-    x = mesh.nodes[mesh.corners]
-    if mesh.bricks:
-        rule = brick_rule(*gauss_points(mesh.dimension, 2))
-        return np.asarray(np.linalg.det(rule.jacobians(x)) @ rule.weights)
-    size = {2: 2.0, 3: 6.0}[mesh.dimension]
-    return np.asarray(np.linalg.det(x[:, 1:] - x[:, :1]) / size)
+    def quadratic(self) -> "Mesh":
+        """Return the mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10), of
+        hexahedra also of every face and cell (hex8 -> hex27). `SceneError` for quadrilaterals."""
+        if self.order == 2:
+            return self
+        if self.kind == "quad4":
+            raise SceneError("elements of kind quad4 have no quadratic form; use simplices")
+        if self.bricks:
+            # Every new node once: it is known by the corners of the edge, face or cell it is in.
+            n, keys = len(self.nodes), _middle_keys(self.cells, 3)
+            known, first, number = np.unique(
+                keys.reshape(-1, 8), axis=0, return_index=True, return_inverse=True
+            )
+            shares = brick_values(LATTICE[3][8:])
+            nodes = np.einsum("ma,eai->emi", shares, self.nodes[self.cells]).reshape(-1, 3)[first]
+            cells = np.hstack([self.cells, n + number.reshape(len(self.cells), -1)])
+            at = {tuple(key): n + i for i, key in enumerate(known.tolist())}
+            facets = {name: _with_all_middles(f, at) for name, f in self.facets.items()}
+            return Mesh(np.vstack([self.nodes, nodes]), cells, "hex27", facets)
+        d, n = self.dimension, len(self.nodes)
+        ends = np.sort(self.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
+        edges, number = np.unique(ends, axis=0, return_inverse=True)
+        middle = self.nodes[edges].mean(axis=1)
+        cells = np.hstack([self.cells, n + number.reshape(len(self.cells), -1)])
+        key = edges[:, 0] * n + edges[:, 1]
+        facets = {name: _with_middles(f, key, n) for name, f in self.facets.items()}
+        kind: Kind = "tri6" if d == 2 else "tet10"
+        return Mesh(np.vstack([self.nodes, middle]), cells, kind, facets)
 
 
 def require_positive_cells(
@@ -165,7 +194,7 @@ def require_positive_cells(
     """Raise `SceneError` naming the worst cell when any volume is not clearly positive."""
     # Signed volume (e,) of every cell as its worst corner has it: bricks may fold over there.
     if not mesh.bricks:
-        volumes = cell_volumes(mesh)
+        volumes = mesh.cell_volumes()
     else:
         corners = CORNERS[mesh.dimension]
         at_corners = brick_rule(corners, np.zeros(len(corners)))
@@ -221,36 +250,6 @@ def boundary_facets(corners: Ints, dimension: int) -> Ints:
     )
     outside: Ints = facets[first[count == 1]]
     return outside
-
-
-def quadratic(mesh: Mesh) -> Mesh:
-    """Return the mesh with a node in the middle of every edge (tri3 -> tri6, tet4 -> tet10), of
-    hexahedra also of every face and cell (hex8 -> hex27). `SceneError` for quadrilaterals."""
-    if mesh.order == 2:
-        return mesh
-    if mesh.kind == "quad4":
-        raise SceneError("elements of kind quad4 have no quadratic form; use simplices")
-    if mesh.bricks:
-        # Every new node once: it is known by the corners of the edge, face or cell it is in.
-        n, keys = len(mesh.nodes), _middle_keys(mesh.cells, 3)
-        known, first, number = np.unique(
-            keys.reshape(-1, 8), axis=0, return_index=True, return_inverse=True
-        )
-        shares = brick_values(LATTICE[3][8:])
-        nodes = np.einsum("ma,eai->emi", shares, mesh.nodes[mesh.cells]).reshape(-1, 3)[first]
-        cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
-        at = {tuple(key): n + i for i, key in enumerate(known.tolist())}
-        facets = {name: _with_all_middles(f, at) for name, f in mesh.facets.items()}
-        return Mesh(np.vstack([mesh.nodes, nodes]), cells, "hex27", facets)
-    d, n = mesh.dimension, len(mesh.nodes)
-    ends = np.sort(mesh.cells[:, list(EDGES[d])].reshape(-1, 2), axis=1)
-    edges, number = np.unique(ends, axis=0, return_inverse=True)
-    middle = mesh.nodes[edges].mean(axis=1)
-    cells = np.hstack([mesh.cells, n + number.reshape(len(mesh.cells), -1)])
-    key = edges[:, 0] * n + edges[:, 1]
-    facets = {name: _with_middles(f, key, n) for name, f in mesh.facets.items()}
-    kind: Kind = "tri6" if d == 2 else "tet10"
-    return Mesh(np.vstack([mesh.nodes, middle]), cells, kind, facets)
 
 
 def _with_middles(facets: Ints, key: Ints, n: int) -> Ints:

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import spsolve
 from validate.arrays import Floats
 from validate.estimate.gating import NoiseSettings
 from validate.estimate.kalman.coordinates import Batch
-from validate.estimate.measurements import Measurements, Timetable, timetable
+from validate.estimate.measurements import Measurements, Timetable
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -41,7 +41,7 @@ class Nudging:
         reached = spsolve(system.K[free][:, free].tocsc(), H.T).reshape(H.T.shape)
         L = np.zeros((system.K.shape[0], len(H)))
         L[free] = np.linalg.solve((H @ reached).T, reached.T).T
-        table = timetable(measurements, self.dt)
+        table = measurements.timetable(self.dt)
         return NudgedStepper(Newmark(self.dt).prepare(system), measurements, table, L, self.gain)
 
 

@@ -17,7 +17,7 @@ from validate.recording.types import Recording
 from validate.scene.body_facts import SAME, largest_side, odd_size
 from validate.scene.contact import Indenter, RigidContact
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.places import GRAMMAR, place_of
 from validate.units import in_si, split
 
@@ -233,4 +233,4 @@ def quadratic_fits(mesh: Mesh | None) -> bool:
     first answer; hexahedra are taken as they are."""
     if mesh is None or mesh.bricks:
         return False
-    return linear_seconds(8 * quadratic(mesh).nodes.size) <= MESHES
+    return linear_seconds(8 * mesh.quadratic().nodes.size) <= MESHES

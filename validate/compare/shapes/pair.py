@@ -12,7 +12,7 @@ from scipy import sparse
 from validate.arrays import Floats, Ints, checked
 from validate.errors import ComparisonError
 from validate.fem.assembly.assemble import jacobians, nodal_rule, rule, stiffness
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.scene import Scene
 from validate.scene.shape_functions import EDGES
@@ -375,7 +375,7 @@ def count_outside(pair: FieldPair) -> int:
 def _carried(field: Field, on: Mesh) -> tuple[Floats, Floats]:
     if same_mesh(field.mesh, on):
         return field.u, np.zeros(0)
-    rows = barycentric_rows(field.mesh, on.nodes)
+    rows = Rows.barycentric(field.mesh, on.nodes)
     away = np.linalg.norm(np.ptp(on.nodes, axis=0)) * ON_THE_MESH
     far = int((rows.outside > away).sum())
     if far > MOST_OUTSIDE * len(on.nodes):

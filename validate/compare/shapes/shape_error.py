@@ -267,10 +267,9 @@ class Boundaries:
     def units(self) -> Mapping[str, object]:
         return {}
 
-
-def boundary_scores(name: str, boundaries: Boundaries) -> tuple[Score, ...]:
-    """Scores `<name>.<metric>` of two boundaries."""
-    return tuple(metric.score(boundaries, f"{name}.") for metric in BOUNDARY_METRICS)
+    def scores(self, name: str) -> tuple[Score, ...]:
+        """Scores `<name>.<metric>` of the two."""
+        return tuple(metric.score(self, f"{name}.") for metric in BOUNDARY_METRICS)
 
 
 def _pieces(boundary: Boundary) -> int:

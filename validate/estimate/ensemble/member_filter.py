@@ -35,7 +35,7 @@ from validate.estimate.gating import (
 )
 from validate.estimate.kalman.coordinates import OneAtATime
 from validate.estimate.kalman.formulas import Corrected, Innovation, innovation_units, nothing
-from validate.estimate.measurements import Measurements, Timetable, timetable
+from validate.estimate.measurements import Measurements, Timetable
 from validate.fem.critical import critical_step
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -161,7 +161,7 @@ def sight(model: MemberModel, members: Members, measurements: Measurements) -> S
     H, shapes = measurements.H, members.displaced
     at = np.unique(H.indices) if shapes is None else np.arange(len(shapes))
     rows = H[:, at].toarray() if shapes is None else H @ shapes.T
-    times, R = timetable(measurements, model.h), np.diag(measurements.variances(model.R))
+    times, R = measurements.timetable(model.h), np.diag(measurements.variances(model.R))
     care = care_of(measurements, model.gate, model.clock, model.h)
     return Sight(measurements, times, np.asarray(rows), at.astype(np.int64), R, care)
 

@@ -33,7 +33,7 @@ from validate.estimate.gating import (
 )
 from validate.estimate.kalman.covariance import noise
 from validate.estimate.kalman.formulas import Innovation
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.fem.large_strain.explicit import Precision
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -93,7 +93,7 @@ class NodeEKF:
         care = care_of(measurements, self.gate, self.clock, explicit.h)
         core = NodeCore(self, explicit, rows, R, free, self.Qp * free, care)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
-        times = timetable(measurements, explicit.h)
+        times = measurements.timetable(explicit.h)
         return ExplicitFilterStepper(explicit, core, measurements, times, refusal, care)
 
 

@@ -23,7 +23,7 @@ from validate.estimate.gating import (
     gated_out,
 )
 from validate.estimate.kalman.formulas import Innovation, best_gain, innovation, nothing
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.reduced_kf import (
     CoreStepper,
     LinearModel,
@@ -154,7 +154,7 @@ class FilterpyFilter:
             require_exact_covariances(first)
         care = care_of(measurements, self.gate, self.clock, self.dt)
         core = FilterpyCore(reduced, first, self.seed, care)
-        table = timetable(measurements, self.dt)
+        table = measurements.timetable(self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
 
 

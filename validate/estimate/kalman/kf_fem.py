@@ -40,7 +40,7 @@ from validate.estimate.kalman.displacement_filter import (
     Structure,
     load_shapes,
 )
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.estimate.smoother import smooth_setting
 from validate.fem.system import System, once
 from validate.memory import require_memory
@@ -125,7 +125,7 @@ class KfFem(DisplacementNoise):
             covariance = modal_covariance(self, system, measurements, modes)
         if self.care(measurements):
             return stepper_of(self, system, measurements, nodal, covariance, claimed, None)
-        gains = shared_gains(system, covariance, timetable(measurements, self.dt), self.settled)
+        gains = shared_gains(system, covariance, measurements.timetable(self.dt), self.settled)
         in_nodes = gains.mapped(claimed.free)
         return stepper_of(self, system, measurements, nodal, covariance, claimed, in_nodes)
 
@@ -168,7 +168,7 @@ def stepper_of(
     gains: GainSequence | None,
 ) -> DisplacementStepper:
     """Return the stepper in `coordinates`, its covariance recursed in those of `claimed`."""
-    table, H = timetable(measurements, settings.dt), measurements.free(system.free)
+    table, H = measurements.timetable(settings.dt), measurements.free(system.free)
     seen = H @ coordinates.shapes if isinstance(coordinates, InModes) else H
     rule, a0 = Rule.of(settings.rule, settings.dt), settings.a0
     excited = once(system, ("excited", rule, a0), lambda: excitation(system, rule, a0=a0))

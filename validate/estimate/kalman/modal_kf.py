@@ -11,7 +11,7 @@ from validate.estimate.kalman.coordinates import InModes, in_modes
 from validate.estimate.kalman.covariance import shared_gains
 from validate.estimate.kalman.displacement_filter import DisplacementStepper
 from validate.estimate.kalman.kf_fem import DisplacementNoise, Gains, modal_covariance, stepper_of
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.solve.dynamic.newmark_rule import Rule
@@ -36,7 +36,7 @@ class ModalKf(DisplacementNoise):
         """`prepare` with modes that are known: many settings of one system share them."""
         covariance = modal_covariance(self, system, measurements, modes)
         beforehand = self.gains == "shared" and self.care(measurements) is None
-        table = timetable(measurements, self.dt)
+        table = measurements.timetable(self.dt)
         gains = None
         if beforehand:
             gains = shared_gains(system, covariance, table, self.settled)

@@ -24,7 +24,7 @@ from validate.estimate.kalman.formulas import (
     kf_update,
     nothing,
 )
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.reduced_kf import CoreStepper
 from validate.estimate.smoother import Look, Note, Transition, look_of, smooth_setting
 from validate.fem.system import System
@@ -79,7 +79,7 @@ class LoadScale:
             per_newton,
             care,
         )
-        table = timetable(measurements, self.dt)
+        table = measurements.timetable(self.dt)
         return CoreStepper(system, core, measurements, table, care, self.smooth)
 
 

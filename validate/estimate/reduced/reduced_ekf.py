@@ -32,7 +32,7 @@ from validate.estimate.extended.explicit_filter import (
 from validate.estimate.gating import Care, NoiseSettings, care_of, clock_setting, gate_setting
 from validate.estimate.kalman.covariance import Claim, Dense, Event, Recursion, events, schedule
 from validate.estimate.kalman.formulas import Gain, Innovation, innovation
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.reduced_kf import steady
 from validate.estimate.smoother import (
     Look,
@@ -174,7 +174,7 @@ class ReducedEKF:
         require_exact(self.smooth, self.gains)
         explicit = explicit_step(system, self.dt, self.substeps)
         refusal = beyond(system, explicit.h) if self.beyond_limit == "refuse" else ""
-        times = timetable(measurements, explicit.h)
+        times = measurements.timetable(explicit.h)
         if refusal:
             basis = modes(system, 1)
         elif self.basis == "pod":

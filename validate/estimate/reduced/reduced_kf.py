@@ -42,7 +42,7 @@ from validate.estimate.kalman.formulas import (
     nothing,
     propagated,
 )
-from validate.estimate.measurements import Measurements, Timetable, timetable
+from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import (
     Look,
     Note,
@@ -326,7 +326,7 @@ class ReducedKf:
         doubt = LoadDoubt(self.load_start, self.load_walk, self.load_jitter)
         R = measurements.variances(self.R)
         model = reduced_model(system, measurements, self.dt, self.modes, doubt, R)
-        table = timetable(measurements, self.dt)
+        table = measurements.timetable(self.dt)
         care = care_of(measurements, self.gate, self.clock, self.dt)
         make = _steady if self.gains == "steady" else _exact
         core = make(model, schedule(table), self.settled, care)

@@ -42,7 +42,7 @@ from skfem.models.elasticity import lame_parameters
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.places import Place, facets_of, kind_of, nodes_of
 from validate.scene.scene import Foundation, Membrane, Pressure, Scene, Weight
 from validate.scene.shape_functions import (
@@ -357,7 +357,7 @@ def stiffness_points(mesh: Mesh) -> StiffnessPoints:
     L = np.full((1, d + 1), 1 / (d + 1)) if mesh.order == 1 else symmetric_points(d, 2)[0]
     slopes = simplex_slopes(mesh.order, L)
     slopes = (slopes.reshape(-1, d + 1) @ dL).reshape(len(dL), *slopes.shape[:2], d)
-    weights = np.repeat(cell_volumes(mesh)[:, None] / len(L), len(L), axis=1)
+    weights = np.repeat(mesh.cell_volumes()[:, None] / len(L), len(L), axis=1)
     return StiffnessPoints(slopes, weights, L @ mesh.nodes[mesh.corners])
 
 
@@ -403,7 +403,7 @@ def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
 
 def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
     """B (e, N) so that B u is the volume strain of every linear cell, and volumes (e,) m^d."""
-    return rows_of_cells(mesh, shape_gradients(mesh)), cell_volumes(mesh)
+    return rows_of_cells(mesh, shape_gradients(mesh)), mesh.cell_volumes()
 
 
 def rows_of_cells(mesh: Mesh, values: Floats) -> sparse.csr_array:

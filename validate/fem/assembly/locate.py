@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -81,53 +82,55 @@ class Rows:
         """Values (k, d) at the points from nodal values (n, d)."""
         return np.asarray(self.weights @ nodal)
 
+    @classmethod
+    def barycentric(cls, mesh: Mesh, points: Floats) -> Self:
+        """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
+        if mesh.bricks:
+            cells = _near_cells(mesh, points)
+            x = mesh.nodes[mesh.corners[cells]]
+            flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
+            xi = np.clip(_local(flat, each), 0.0, 1.0)
+            feet = np.einsum("ka,kad->kd", brick_values(xi), flat)
+            away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
+            # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
+            best, pick = np.argmin(away, axis=1), np.arange(len(points))
+            weights = brick_values(xi.reshape(*cells.shape, -1)[pick, best], mesh.order)
+            return cls(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
+        L, cell = _barycentric(mesh, points)
+        clipped = np.clip(L, 0, None)
+        clipped /= clipped.sum(axis=1, keepdims=True)
+        corners = mesh.nodes[mesh.corners[cell]]
+        feet = np.einsum("ka,kad->kd", clipped, corners)
+        weights = simplex_values(mesh.order, clipped)
+        return cls(_csr(mesh.cells[cell], weights, mesh), np.linalg.norm(points - feet, axis=1))
 
-def barycentric_rows(mesh: Mesh, points: Floats) -> Rows:
-    """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
-    if mesh.bricks:
-        cells = _near_cells(mesh, points)
-        x = mesh.nodes[mesh.corners[cells]]
-        flat, each = x.reshape(-1, *x.shape[2:]), np.repeat(points, cells.shape[1], axis=0)
-        xi = np.clip(_local(flat, each), 0.0, 1.0)
-        feet = np.einsum("ka,kad->kd", brick_values(xi), flat)
-        away = np.linalg.norm(each - feet, axis=1).reshape(cells.shape)
-        # Judged by the feet: where a step to local coordinates has strayed, they say nothing.
-        best, pick = np.argmin(away, axis=1), np.arange(len(points))
-        weights = brick_values(xi.reshape(*cells.shape, -1)[pick, best], mesh.order)
-        return Rows(_csr(mesh.cells[cells[pick, best]], weights, mesh), away[pick, best])
-    L, cell = _barycentric(mesh, points)
-    clipped = np.clip(L, 0, None)
-    clipped /= clipped.sum(axis=1, keepdims=True)
-    corners = mesh.nodes[mesh.corners[cell]]
-    feet = np.einsum("ka,kad->kd", clipped, corners)
-    weights = simplex_values(mesh.order, clipped)
-    return Rows(_csr(mesh.cells[cell], weights, mesh), np.linalg.norm(points - feet, axis=1))
-
-
-def standing_rows(mesh: Mesh, points: Floats) -> Rows:
-    """Rows of points off the surface, as markers on stalks: each moves with its foot, the nearest
-    point of the surface (of bricks: of the nearest cell), and turns with the cell below it, by the
-    slope of the affine field (least squares) of its nodes. Points within the mesh are read as
-    `barycentric_rows` does.
-    """
-    rows = barycentric_rows(mesh, points)
-    off = rows.outside > _ROUNDING * float(np.ptp(mesh.nodes, axis=0).max())
-    if off.any() and not mesh.bricks and mesh.dimension == 3:
-        below = np.where(off[:, None], nearest_on_surface(mesh, points), points)
-        rows = Rows(barycentric_rows(mesh, below).weights, np.linalg.norm(points - below, axis=1))
-    weights, feet = rows.weights.copy(), rows.apply(mesh.nodes)
-    for i in np.flatnonzero(off):
-        own = slice(weights.indptr[i], weights.indptr[i + 1])  # all nodes of the cell
-        x = mesh.nodes[weights.indices[own]]
-        affine = np.linalg.pinv(np.column_stack([np.ones(len(x)), x - x.mean(axis=0)]))
-        weights.data[own] += (points[i] - feet[i]) @ affine[1:]
-    return Rows(weights, rows.outside)
+    @classmethod
+    def standing(cls, mesh: Mesh, points: Floats) -> Self:
+        """Rows of points off the surface, as markers on stalks: each moves with its foot, the
+        nearest point of the surface (of bricks: of the nearest cell), and turns with the cell below
+        it, by the slope of the affine field (least squares) of its nodes. Points within the mesh
+        are read as `barycentric` does.
+        """
+        rows = Rows.barycentric(mesh, points)
+        off = rows.outside > _ROUNDING * float(np.ptp(mesh.nodes, axis=0).max())
+        if off.any() and not mesh.bricks and mesh.dimension == 3:
+            below = np.where(off[:, None], nearest_on_surface(mesh, points), points)
+            rows = cls(
+                Rows.barycentric(mesh, below).weights, np.linalg.norm(points - below, axis=1)
+            )
+        weights, feet = rows.weights.copy(), rows.apply(mesh.nodes)
+        for i in np.flatnonzero(off):
+            own = slice(weights.indptr[i], weights.indptr[i + 1])  # all nodes of the cell
+            x = mesh.nodes[weights.indices[own]]
+            affine = np.linalg.pinv(np.column_stack([np.ones(len(x)), x - x.mean(axis=0)]))
+            weights.data[own] += (points[i] - feet[i]) @ affine[1:]
+        return cls(weights, rows.outside)
 
 
 def probe_rows(mesh: Mesh, probes: Sequence[Probe]) -> Rows:
     """Rows of probes, in their order."""
     points = np.array([p.point for p in probes])
-    return (standing_rows if any(p.stands for p in probes) else barycentric_rows)(mesh, points)
+    return (Rows.standing if any(p.stands for p in probes) else Rows.barycentric)(mesh, points)
 
 
 def nearest_node_rows(mesh: Mesh, points: Floats, among: Ints | None = None) -> Rows:

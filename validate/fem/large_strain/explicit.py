@@ -30,7 +30,7 @@ from validate.fem.kernels.points import NEO_HOOKE, SVK
 from validate.fem.laws.viscoelasticity import cell_branches, taut
 from validate.scene.laws import coupled_lambda, further_laws, ogden_terms
 from validate.scene.material import Material
-from validate.scene.mesh import cell_volumes, require_positive_cells
+from validate.scene.mesh import require_positive_cells
 from validate.scene.scene import Scene
 
 _BRICK_LAWS = ("neo_hooke", "mooney_rivlin", "yeoh")
@@ -363,7 +363,7 @@ def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
     n = ROWS + cards.shape[1]
     rows, cells = np.zeros((blocks * BLOCK, n)), np.zeros((blocks * BLOCK, 4), np.int32)
     rows[:e, :9] = shape_gradients(mesh)[:, 1:].reshape(e, 9)
-    volumes, mu = cell_volumes(mesh), scene.per_cell(lambda m: m.shear_modulus)
+    volumes, mu = mesh.cell_volumes(), scene.per_cell(lambda m: m.shear_modulus)
     rows[:e, 9], rows[:e, 10], rows[:e, ROWS:] = volumes * bulk, volumes * mu, cards
     cells[:e] = 8 * mesh.cells
     packed = on_lines(rows.reshape(blocks, BLOCK, n).swapaxes(1, 2))
@@ -373,7 +373,7 @@ def _packed(scene: Scene) -> tuple[Floats, kernels.Cells]:
 
 def _cards(scene: Scene) -> tuple[Floats, Floats]:
     """What every cell's volume resists by, Pa (e,), and its card (e, k), moduli times volume."""
-    law, volumes = _code(scene.material), cell_volumes(scene.mesh)[:, None]
+    law, volumes = _code(scene.material), scene.mesh.cell_volumes()[:, None]
     lame = law in (SVK, laws.OGDEN_COUPLED)
     bulk = scene.per_cell(lambda m: m.bulk_modulus - (2 * m.shear_modulus / 3 if lame else 0.0))
     if law in (SVK, NEO_HOOKE):

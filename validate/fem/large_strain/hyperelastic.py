@@ -47,7 +47,7 @@ from validate.fem.laws.plane_stress import PlaneStress
 from validate.fem.laws.viscoelasticity import Branches, Lagged, Remembered, second_stress
 from validate.fem.system import System
 from validate.scene.material import Material
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.scene import Scene
 
 # --- Where the entries of the cells go in a sparse matrix, found once and used at every
@@ -98,7 +98,7 @@ class NodalMean:
         self.law, self.kappa = law, kappa
         self.gradients = shape_gradients(mesh)
         cells, n = mesh.corners, len(mesh.nodes)
-        share = np.repeat(cell_volumes(mesh) / 4, 4)
+        share = np.repeat(mesh.cell_volumes() / 4, 4)
         entries = (share, (cells.ravel(), np.repeat(np.arange(len(cells)), 4)))
         gathered = sparse.csr_array(entries, shape=(n, len(cells)))
         self.volumes: Floats = np.asarray(gathered.sum(axis=1))

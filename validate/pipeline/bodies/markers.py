@@ -14,11 +14,11 @@ from validate.recording.types import Markers, Recording
 from validate.register.clocks import clock_sd
 from validate.register.markers.displacements import noise, rested
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.markers import MarkerObservation, observe_markers, vector
+from validate.register.markers.markers import MarkerObservation, vector
 from validate.register.markers.measures import FEWEST
 from validate.register.markers.quality import as_declared
 from validate.register.observation import nearest_sample
-from validate.register.outlines.outlines import OutlineObservation, enclosed, observe_outlines
+from validate.register.outlines.outlines import OutlineObservation, enclosed
 from validate.register.outlines.plane import SurfaceSampler, section
 from validate.scene.mesh import Mesh
 from validate.scene.places import pose_of
@@ -63,7 +63,7 @@ def observed_outline(
             f"the centroid of the body's section. Its position at rest is not evidence.",
         )
     sd_t = clock_sd(recording, topic)
-    return observe_outlines(contours, wall, rest, name=topic, sd_t=sd_t), said
+    return OutlineObservation.of(contours, wall, rest, name=topic, sd_t=sd_t), said
 
 
 def _pose(p: Tree, origin: tuple[float, ...]) -> Floats:
@@ -90,7 +90,7 @@ def registered(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
                 f"a layout, or leave seen.registration out"
             )
         rest = markers.x[0]
-        return observe_markers(
+        return MarkerObservation.of(
             markers, dict(zip(markers.names, rest, strict=True)), mesh, name=topic, stands=np.inf,
             sd_t=clock_sd(recording, topic),
             registration=as_declared(markers.names, rest, markers.sd),
@@ -112,7 +112,7 @@ def registered(recording: Recording, p: Tree, at: BodyAt) -> MarkerObservation:
         markers, names=tuple(markers.names[i] for i in kept), x=markers.x[:, kept],
         sd=noise(markers),
     )  # fmt: skip
-    return observe_markers(
+    return MarkerObservation.of(
         markers, layout, mesh, how=p.settings.seen.registration, name=topic, stands=np.inf,
         sd_t=clock_sd(recording, topic),
     )  # fmt: skip

@@ -15,7 +15,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cost import NODAL_MEAN
 from validate.scene.geometries.indented_bodies import IndentedBlock, IndentedCylinder
 from validate.scene.geometries.specification import Box, Cylinder, Geometry, MeshFile
-from validate.scene.mesh import Mesh, cell_volumes, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
 # --- Height and diameter of equal area of a specimen's mesh file, between its plates.
@@ -55,7 +55,7 @@ def sizes_of_mesh(mesh: Mesh, name: str = "mesh") -> dict[str, float]:
             f"{name}: upper_plate is {-1e3 * height:.4g} mm below lower_plate; expected it above: "
             "exchange the two names"
         )
-    area = float(np.abs(cell_volumes(mesh)).sum()) / height
+    area = float(np.abs(mesh.cell_volumes()).sum()) / height
     return {DIAMETER: 2 * sqrt(area / pi), HEIGHT: height}
 
 
@@ -124,7 +124,7 @@ def unknowns_of(p: Tree, order: int, folder: Path) -> float:
     if not isinstance(body, MeshFile):
         return grid_unknowns(body.cells, round_=is_round(body))
     mesh = mesh_of(p.with_scene(body=replace(body, element="linear")), folder)
-    return float((quadratic(mesh) if order == 2 and not mesh.bricks else mesh).nodes.size)
+    return float((mesh.quadratic() if order == 2 and not mesh.bricks else mesh).nodes.size)
 
 
 def costs_of(p: Tree, order: int, folder: Path) -> float:

@@ -21,7 +21,7 @@ from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.scene.geometries.refinement import refined
 from validate.scene.material import LawName
-from validate.scene.mesh import Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Mesh, require_positive_cells
 from validate.scene.meshless import AnyScene, Meshless
 from validate.scene.scene import Scene
 
@@ -75,7 +75,7 @@ class ExperimentBody:
     def size(self, level: int) -> float:
         """Edge m of a cube (in 2-D a square) as large as a cell is on average."""
         mesh = self.at(level).mesh
-        return float(np.abs(cell_volumes(mesh)).mean() ** (1 / mesh.dimension))
+        return float(np.abs(mesh.cell_volumes()).mean() ** (1 / mesh.dimension))
 
     def _meshed(self, level: int) -> Scene:
         if self.refining:
@@ -174,7 +174,7 @@ def _scaled(p: Parameter, factor: float) -> str:
 
 
 def _volume(mesh: Mesh) -> float:
-    return float(np.abs(cell_volumes(mesh)).sum())
+    return float(np.abs(mesh.cell_volumes()).sum())
 
 
 # --- Height and diameter of equal area of a specimen's mesh file, between its plates.

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.residual import Residual, residuals
+from validate.compare.residual import Residual
 from validate.errors import ComparisonError
 from validate.identify.identification import Identification
 from validate.identify.least_squares import Range, Space, whitened
@@ -71,7 +71,7 @@ class Problem:
             raise ComparisonError(f"'{name}' {ends[0].state} at {at}: {ends[0].why}")
         pairs = zip(followed.registered, followed.runs, strict=True)
         # Those that calibrate
-        found = [r for pair in pairs for r in residuals(*pair)]
+        found = [r for pair in pairs for r in Residual.of(*pair)]
         for wanted in part.on.quantities:
             if not any(wanted in (r.quantity, r.name) for r in found):
                 there = ", ".join(dict.fromkeys(r.name for r in found)) or "none"

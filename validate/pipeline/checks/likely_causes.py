@@ -31,7 +31,6 @@ from validate.recording.scales import odd_scales
 from validate.recording.types import Recording
 from validate.register.observation import History
 from validate.register.signals import SignalObservation
-from validate.scene.mesh import cell_volumes
 from validate.scene.scene import Drive, Scene
 
 Failed = Collection[str]  # quantities of checks, as force.rms
@@ -544,7 +543,7 @@ def _of_compression(
     compared = float(np.ptp(followed.seen.inputs[:, 0])) / along
     if scene.material.law == "linear" and compared > LINEAR:
         yield f"strain of {compared:.3g} by a linear law, which is valid to about 0.1"
-    area = float(np.abs(cell_volumes(scene.mesh)).sum()) * scene.copies / along
+    area = float(np.abs(scene.mesh.cell_volumes()).sum()) * scene.copies / along
     for force in followed.seen.of(SignalObservation):
         if force.unit == "N":
             stress = float(np.abs(force.y).max()) / area

@@ -16,7 +16,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.errors import SceneError, UsageError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.large_strain.explicit import knows_single
 from validate.fem.system import System
 from validate.pipeline.bodies.own_body import ExperimentBody, own_body, with_law
@@ -29,9 +29,9 @@ from validate.pipeline.ladder.ladder import (
     Rung,
     StabilityBody,
     Trial,
+    Turned,
     marker_noise,
     squeezed,
-    turned,
 )
 from validate.pipeline.ladder.references import (
     ORDERS,
@@ -380,7 +380,7 @@ def _points(
     points = centroids(coarsest)
     near = _INSIDE * float(np.ptp(coarsest.nodes, axis=0).max())
     for level in levels:
-        points = points[barycentric_rows(linear(own.at(level).mesh), points).outside <= near]
+        points = points[Rows.barycentric(linear(own.at(level).mesh), points).outside <= near]
     if not len(points):
         raise SceneError("the meshes have no common point; declare a ladder in the experiment")
     probes = [np.array(p.point)[None] for p in own.scene.probes]
@@ -409,7 +409,7 @@ def _body(own: ExperimentBody) -> StabilityBody:
     meshes = own.levels([round(share * fitting[-1]) for share in _COARSER])
     drive = None if own.scene.loads else own.scene.drives[0]
     steps = np.diff(own.seen.t)
-    base = turned(own.scene.material, meshes[-1])
+    base = Turned.of(own.scene.material, meshes[-1])
     return StabilityBody(
         f"{own.experiment.title} ({linear(own.scene.mesh).kind} cells; mesh: percent of the "
         f"experiment's mesh)",

@@ -6,7 +6,7 @@ An experiment may declare its ladder; `pipeline.ladder.default` derives one from
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -129,13 +129,13 @@ class Turned:
             self.E, self.nu, "linear", self.rho, self.mass_damping, self.stiffness_damping
         )
 
-
-def turned(material: Material, mesh: int) -> Turned:
-    """Return a material with density, on a mesh."""
-    m = material
-    if m.rho is None:
-        raise SceneError("a motion needs a density; set the material's rho, kg/m3")
-    return Turned(m.E, m.nu, m.rho, m.mass_damping, m.stiffness_damping, mesh)
+    @classmethod
+    def of(cls, material: Material, mesh: int) -> Self:
+        """Return a material with density, on a mesh."""
+        m = material
+        if m.rho is None:
+            raise SceneError("a motion needs a density; set the material's rho, kg/m3")
+        return cls(m.E, m.nu, m.rho, m.mass_damping, m.stiffness_damping, mesh)
 
 
 @dataclass(frozen=True)

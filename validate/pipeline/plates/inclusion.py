@@ -24,22 +24,16 @@ from validate.pipeline.experiment.tree import Tree, beside, changed_by
 from validate.recording.types import Contours, Recording, Signal
 from validate.register.clocks import clock_sd
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.markers import Sampling, Together, placed_markers
+from validate.register.markers.markers import MarkerObservation, Sampling, Together
 from validate.register.observation import nearest_sample
-from validate.register.outlines.outlines import Corner, observe_outlines
+from validate.register.outlines.outlines import Corner, OutlineObservation
 from validate.register.outlines.plane import SurfaceSampler, outlined_capsule
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.register.registration import Registered
-from validate.register.signals import driving, holds_at, instant, require_rising, validating
+from validate.register.signals import SignalObservation, holds_at, instant, require_rising
 from validate.scene.geometries.box import member
-from validate.scene.geometries.inclusion import (
-    Block,
-    Capsule,
-    InclusionShape,
-    SlicedShape,
-    block_with_inclusion,
-)
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.geometries.inclusion import Block, Capsule, InclusionShape, SlicedShape
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Contact as Contact
 from validate.scene.scene import Scene
 
@@ -162,8 +156,8 @@ class BlockWithInclusion:
     def __call__(self, recording: Recording, tree: Tree) -> Mesh:
         x, y, z = self.cells
         grid = (x + 1, y + 1, z + 1)
-        mesh = block_with_inclusion(self.block, grid, inclusion(recording, tree))
-        return quadratic(mesh) if self.element == "quadratic" else mesh
+        mesh = self.block.around(grid, inclusion(recording, tree))
+        return mesh.quadratic() if self.element == "quadratic" else mesh
 
 
 def inclusion(recording: Recording, tree: Tree) -> InclusionShape:
@@ -207,7 +201,9 @@ def _outlined(recording: Recording, tree: Tree) -> Capsule:
     """Centre x, z and radius of the rest outline; height and length from record 'inclusion'."""
     streams, how = tree.settings.streams, tree.settings.registration
     contours = shifted(recording.contour(streams.outline), tree)
-    rest = holds_at(driving(recording, streams.stage, "m"), contours.t, (), within=WITHIN)[0]
+    rest = holds_at(
+        SignalObservation.driving(recording, streams.stage, "m"), contours.t, (), within=WITHIN
+    )[0]
     index = nearest_sample(contours.t, instant(rest), "outlines")
     moved = abs(how.image_shift_x) + abs(how.image_shift_z)
     return outlined_capsule(contours, index, recording.record("inclusion"), moved)
@@ -375,21 +371,23 @@ def placed(
     measured = measured_inclusion(recording, tree)
     shape = None if how.wall == "facets" else measured
     wall = SurfaceSampler.of_cavity(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
-    stage = driving(recording, streams.stage, "m")
+    stage = SignalObservation.driving(recording, streams.stage, "m")
     signals = []
     for topic in streams.signals:
         # Where the unit is absent or of another kind, the one to be asked for
         found = recording.signals.get(topic)
         unit = found.unit if found is not None and found.unit in _TRACES else "N"
         name, trace = _TRACES[unit]
-        signals.append(validating(recording, topic, unit, quantity=name, trace=trace))
+        signals.append(
+            SignalObservation.validating(recording, topic, unit, quantity=name, trace=trace)
+        )
         require_rising(stage, signals[-1])
     rest, *holds = holds_at(stage, contours.t, loads, within=WITHIN)
-    outline = observe_outlines(
+    outline = OutlineObservation.of(
         contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
         sd_t=clock_sd(recording, streams.outline),
     )  # fmt: skip
-    markers = placed_markers(
+    markers = MarkerObservation.placed(
         recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
         up=(0.0, 1.0, 0.0), how=how, sampling=how.sampling,
     )  # fmt: skip

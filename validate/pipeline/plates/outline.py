@@ -18,7 +18,7 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Selection, nearest_samples
-from validate.register.outlines.outlines import enclosed, observe_outlines
+from validate.register.outlines.outlines import OutlineObservation, enclosed
 from validate.register.outlines.plane import SurfaceSampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -63,7 +63,7 @@ def with_outline(
     mesh.facet_nodes(card.surface)
     stage = seen.drives[0]
     at, held = _instants(contours, stage, card)
-    found = observe_outlines(
+    found = OutlineObservation.of(
         contours, SurfaceSampler.of_cavity(mesh, card.surface, None, 4), float(at[0]),
         name=str(card.topic), sd_t=clock_sd(recording, str(card.topic)),
     )  # fmt: skip

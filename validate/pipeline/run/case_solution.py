@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from validate.arrays import Floats
-from validate.compare.residual import residuals, stacked
+from validate.compare.residual import Residual, stacked
 from validate.fem.assembly.locate import Rows
 from validate.fem.system import System
 from validate.fem.system import build as build_system
@@ -52,7 +52,7 @@ def solve(
                   {"updates": Trace(none, "1")}, Outcome("refused", 0, refused),
                   0.0, None)  # fmt: skip
     done = tuple(not_run if refused else runs.on(*pair) for pair in zip(seen, scenes, strict=True))
-    found = [r for pair in zip(seen, done, strict=True) for r in residuals(*pair)]
+    found = [r for pair in zip(seen, done, strict=True) for r in Residual.of(*pair)]
     peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss  # bytes, of this process
     done = tuple(replace(run, memory=run.memory or peak) for run in done)
     # What the method was run as, where parameters changed that

@@ -6,7 +6,7 @@ Start with `markers`.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "markers": ("Together", "MarkerObservation", "observe_markers", "placed_markers", "vector"),
+    "markers": ("Together", "MarkerObservation", "vector"),
 }
 
 __all__ = names(_HOMES)

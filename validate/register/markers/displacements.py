@@ -10,7 +10,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import RegistrationError
-from validate.fem.assembly.locate import Rows, require_inside, standing_rows
+from validate.fem.assembly.locate import Rows, require_inside
 from validate.recording.scales import another_unit
 from validate.recording.types import Markers
 from validate.register.markers.markers import MarkerObservation
@@ -123,7 +123,7 @@ def since_rest(
     factor where its unit is another one.
     """
     rest: Floats = whole.x[0]
-    rows = standing_rows(mesh, rest)
+    rows = Rows.standing(mesh, rest)
     try:
         require_inside(rows, whole.names, stands)
     except RegistrationError as error:

@@ -2,24 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from validate.arrays import Floats, Ints, rms
 from validate.errors import RegistrationError
-from validate.fem.assembly.locate import (
-    Rows,
-    barycentric_rows,
-    nearest_node_rows,
-    require_inside,
-    standing_rows,
-)
+from validate.fem.assembly.locate import Rows, nearest_node_rows, require_inside
 from validate.recording.types import Markers, Recording
 from validate.register.clocks import SAME, clock_sd, interpolated, slopes, with_clock
 from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.quality import LINE, Registration, register_points
+from validate.register.markers.quality import LINE, Registration
 from validate.register.markers.transform import spread
 from validate.register.observation import (
     AnyDraw,
@@ -140,7 +134,7 @@ class MarkerObservation:
     def within(self, mesh: Mesh) -> "MarkerObservation":
         """Return the markers that lie in a mesh of part of the body (within 0.1 mm); the
         registration stays that of all of them."""
-        rows = barycentric_rows(mesh, self.rest)
+        rows = Rows.barycentric(mesh, self.rest)
         kept = np.flatnonzero(rows.outside <= _INSIDE)
         return replace(
             self,
@@ -269,102 +263,104 @@ class MarkerObservation:
         flat = slopes(self.t, x.reshape(len(x), -1), samples, sd_t)
         return flat.reshape(len(samples), *x.shape[1:])
 
+    @classmethod
+    def placed(
+        cls,
+        recording: Recording,
+        mesh: Mesh,
+        *,
+        topic: str = "markers",
+        how: MarkerFit = MarkerFit(),
+        sampling: Sampling = "barycentric",
+        together: tuple[Together, ...] = (),
+        tracker: str = "camera",
+        up: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Self:
+        """`of` by the recording's own records: "marker_layout" (m), and `tracker`, whose
+        "up" in the markers' frame is the scene's direction `up`.
+
+        `up` is used for a layout that is a plane within the noise; any other shows a mirror itself.
+        Raises `RecordingError` for an absent record, `RegistrationError` for one that is no vector,
+        and whatever `of` does.
+        """
+        layout = {
+            name: vector(text, f"marker_layout '{name}'")
+            for name, text in recording.record("marker_layout").items()
+        }
+        markers = recording.marker(topic)
+        seen_up = vector(recording.record(tracker).get("up", ""), f"{tracker} 'up'")
+        axes = (seen_up, np.array(up)) if _planar(layout, markers.sd) else None
+        return cls.of(
+            markers, layout, mesh, how=how, sampling=sampling, up=axes, name=topic,
+            together=together, sd_t=clock_sd(recording, topic),
+        )  # fmt: skip
+
+    @classmethod
+    def of(
+        cls,
+        markers: Markers,
+        layout: Mapping[str, Floats],
+        mesh: Mesh,
+        *,
+        how: MarkerFit = MarkerFit(),
+        sampling: Sampling = "barycentric",
+        up: tuple[Floats, Floats] | None = None,
+        name: str = "markers",
+        role: Role = "validates",
+        together: tuple[Together, ...] = (),
+        sd_t: float = 0.0,
+        stands: float = 0.0,
+        registration: Registration | None = None,
+    ) -> Self:
+        """Register the markers' first instant (rest) to their layout (3,) m; frozen for the rest. A
+        `registration` that is known already is taken as it is.
+
+        `up` is one direction in the markers' frame and in the scene's: without it a planar set that
+        was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the
+        plane z = 0 of the layout: what markers do across it is dropped. Markers on stalks may stand
+        `stands` m off the surface and turn with it. Raises `RegistrationError` for names that the
+        layout lacks, for markers outside the mesh, and for whatever `Registration.of` finds.
+        """
+        unknown = [marker for marker in markers.names if marker not in layout]
+        if unknown:
+            raise RegistrationError(
+                f"{len(unknown)} of {len(markers.names)} markers are not in the layout: "
+                f"{unknown[:5]}"
+            )
+        rest = np.array([layout[marker] for marker in markers.names])
+        _require_scale(markers.x[0], rest)
+        if registration is None:
+            registration = Registration.of(
+                markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
+                robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
+            )  # fmt: skip
+        d = mesh.dimension
+        # Noise m along the first d axes of the scene where it differs between directions.
+        if registration.noise is None:
+            sds = ()
+        else:
+            R = registration.transform.R
+            sds = tuple(np.sqrt(np.diag(R @ registration.noise @ R.T))[:d].tolist())
+        places = rest[:, :d]
+        if sampling == "nearest_node":
+            rows = nearest_node_rows(mesh, places)
+        else:
+            rows = (Rows.standing if stands else Rows.barycentric)(mesh, places)
+        if sampling == "barycentric":
+            require_inside(rows, markers.names, max(stands, _INSIDE))
+        x = np.array([registration.transform.apply(frame) for frame in markers.x])
+        require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
+        return cls(
+            name, role, markers.t, markers.names, x[..., :d], places, rows,
+            rms(sds) if sds else registration.expected_sd,
+            registration.tre_at(rest), registration, together, sd_t, sds,
+        )  # fmt: skip
+
 
 def _largest(moved: Floats) -> float | None:
     """The longest displacement m of (..., d) that was seen."""
     lengths = np.linalg.norm(moved, axis=-1)
     return float(np.nanmax(lengths)) if np.isfinite(lengths).any() else None
-
-
-def observe_markers(
-    markers: Markers,
-    layout: Mapping[str, Floats],
-    mesh: Mesh,
-    *,
-    how: MarkerFit = MarkerFit(),
-    sampling: Sampling = "barycentric",
-    up: tuple[Floats, Floats] | None = None,
-    name: str = "markers",
-    role: Role = "validates",
-    together: tuple[Together, ...] = (),
-    sd_t: float = 0.0,
-    stands: float = 0.0,
-    registration: Registration | None = None,
-) -> MarkerObservation:
-    """Register the markers' first instant (rest) to their layout (3,) m; frozen for the rest. A
-    `registration` that is known already is taken as it is.
-
-    `up` is one direction in the markers' frame and in the scene's: without it a planar set that
-    was mirrored within its plane could not be told from the true one. A 2-D mesh lies in the plane
-    z = 0 of the layout: what markers do across it is dropped. Markers on stalks may stand
-    `stands` m off the surface and turn with it.
-    Raises `RegistrationError` for names that the layout lacks, for markers outside the mesh, and
-    for whatever `register_points` finds.
-    """
-    unknown = [marker for marker in markers.names if marker not in layout]
-    if unknown:
-        raise RegistrationError(
-            f"{len(unknown)} of {len(markers.names)} markers are not in the layout: {unknown[:5]}"
-        )
-    rest = np.array([layout[marker] for marker in markers.names])
-    _require_scale(markers.x[0], rest)
-    if registration is None:
-        registration = register_points(
-            markers.names, markers.x[0], rest, method=how.method, exclude=how.exclude,
-            robust=how.robust, expected_sd=how.noise(markers.sd), up=up,
-        )  # fmt: skip
-    d = mesh.dimension
-    # Noise m along the first d axes of the scene where it differs between directions.
-    if registration.noise is None:
-        sds = ()
-    else:
-        R = registration.transform.R
-        sds = tuple(np.sqrt(np.diag(R @ registration.noise @ R.T))[:d].tolist())
-    places = rest[:, :d]
-    if sampling == "nearest_node":
-        rows = nearest_node_rows(mesh, places)
-    else:
-        rows = (standing_rows if stands else barycentric_rows)(mesh, places)
-    if sampling == "barycentric":
-        require_inside(rows, markers.names, max(stands, _INSIDE))
-    x = np.array([registration.transform.apply(frame) for frame in markers.x])
-    require_steady_labels(markers.names, rest, x, markers.t, markers.sd)
-    return MarkerObservation(
-        name, role, markers.t, markers.names, x[..., :d], places, rows,
-        rms(sds) if sds else registration.expected_sd,
-        registration.tre_at(rest), registration, together, sd_t, sds,
-    )  # fmt: skip
-
-
-def placed_markers(
-    recording: Recording,
-    mesh: Mesh,
-    *,
-    topic: str = "markers",
-    how: MarkerFit = MarkerFit(),
-    sampling: Sampling = "barycentric",
-    together: tuple[Together, ...] = (),
-    tracker: str = "camera",
-    up: tuple[float, float, float] = (0.0, 0.0, 1.0),
-) -> MarkerObservation:
-    """`observe_markers` by the recording's own records: "marker_layout" (m), and `tracker`, whose
-    "up" in the markers' frame is the scene's direction `up`.
-
-    `up` is used for a layout that is a plane within the noise; any other shows a mirror itself.
-    Raises `RecordingError` for an absent record, `RegistrationError` for one that is no vector, and
-    whatever `observe_markers` does.
-    """
-    layout = {
-        name: vector(text, f"marker_layout '{name}'")
-        for name, text in recording.record("marker_layout").items()
-    }
-    markers = recording.marker(topic)
-    seen_up = vector(recording.record(tracker).get("up", ""), f"{tracker} 'up'")
-    axes = (seen_up, np.array(up)) if _planar(layout, markers.sd) else None
-    return observe_markers(
-        markers, layout, mesh, how=how, sampling=sampling, up=axes, name=topic,
-        together=together, sd_t=clock_sd(recording, topic),
-    )  # fmt: skip
 
 
 def vector(text: str, what: str) -> Floats:

@@ -13,7 +13,7 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import get_args
+from typing import Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -108,86 +108,88 @@ class Registration:
             return weighted_covariance(at, self.markers, self.noise, self.transform)
         return measures.target_covariance(at, self.markers, self.fle, _scaled(self.method))
 
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        source: ArrayLike,
+        target: ArrayLike,
+        *,
+        method: Method = "rigid",
+        expected_sd: ArrayLike,
+        exclude: Sequence[str] = (),
+        robust: bool = False,
+        up: Up | None = None,
+    ) -> Self:
+        """Register named markers: source (k, d) m measured, target (k, d) m, NaN rows = not seen.
 
-def register_points(
-    names: Sequence[str],
-    source: ArrayLike,
-    target: ArrayLike,
-    *,
-    method: Method = "rigid",
-    expected_sd: ArrayLike,
-    exclude: Sequence[str] = (),
-    robust: bool = False,
-    up: Up | None = None,
-) -> Registration:
-    """Register named markers: source (k, d) m measured, target (k, d) m, NaN rows = not seen.
+        expected_sd: declared measurement noise, m per axis, 0 for exact data; or for the rigid
+        method three along the source's axes, or a covariance (3, 3) m^2: the fit is then weighted,
+        and what may be noise is judged by the worst direction. `up`: directions in the source and
+        target frame to the same side of a planar marker set; it alone reveals a mirror within the
+        plane. Methods: rigid; similarity (scale free); two_step and two_step_scaled (paper 000;
+        3-D, planar).
 
-    expected_sd: declared measurement noise, m per axis, 0 for exact data; or for the rigid method
-    three along the source's axes, or a covariance (3, 3) m^2: the fit is then weighted, and what
-    may be noise is judged by the worst direction. `up`: directions in the
-    source and target frame to the same side of a planar marker set; it alone reveals a mirror
-    within the plane. Methods: rigid; similarity (scale free); two_step and two_step_scaled (paper
-    000; 3-D, planar).
-
-    A residual that noise exceeds with probability `P_EXCESS` is explained in this order: mirrored
-    or permuted markers raise `RegistrationError` with both residuals; outliers and an unexplained
-    excess are findings. An outlier that moves the others by more than twice the uncertainty of the
-    fit without it raises `RegistrationError`, unless `robust`: least squares are then repeated
-    without the outliers, weights 0 or 1 (Rousseeuw & Leroy (1987), reweighted least squares).
-    Raises `RegistrationError` also for fewer than `FEWEST` markers, degenerate sets, a set no
-    thicker across its line than `LINE` times the noise, and unknown names.
-    """
-    x, y, kept, missing = _used(names, source, target, exclude)
-    C = _anisotropic(expected_sd, method)
-    declared = (
-        float(np.sqrt(np.linalg.eigvalsh(C)[-1]))
-        if C is not None
-        else float(np.asarray(expected_sd))
-    )
-    _check_settings(method, declared, x, y)
-    plain = _fitter(method, up)
-    fit = plain if C is None else partial(_weighted, first=plain, C=C)
-    noise = max(declared, measures.ROUNDING * float(spread(y)[0]))
-    mirror = measures.reflection(x, y, plain, _across(x.shape[1], up))
-    bound = noise * np.sqrt(measures.chi_square_bound(_freedom(y, method)) / len(y))
-    if mirror.proper > bound:
-        if measures.looks_mirrored(mirror, bound):
-            raise RegistrationError(
-                f"markers seem mirrored: residual {1e3 * mirror.proper:.3g} mm by a rotation, "
-                f"{1e3 * mirror.improper:.3g} mm by a reflection; check axis signs and handedness"
-            )
-        fault = label_fault(kept, x, y, plain, noise)
-        if fault is not None:
-            raise RegistrationError(fault)
-    outliers = measures.find_outliers(kept, x, y, noise, _scaled(method))
-    regular = ~np.isin(kept, [o.name for o in outliers])
-    if outliers and not robust:
-        _refuse_moved(outliers, x, y, regular, fit, noise, _scaled(method))
-    scale = measures.fitted_scale(x[regular], y[regular], noise)
-    findings = [
-        *_left_out(len(names), missing, tuple(exclude)),
-        *_outlying(outliers, robust),
-        *_other_size(scale, _scaled(method)),
-        *_excess(x[regular], y[regular], fit, noise, len(outliers), method),
-    ]
-    used = regular if robust else np.ones(len(kept), bool)
-    transform = fit(x[used], y[used])
-    return Registration(
-        transform=transform,
-        names=tuple(n for n, use in zip(kept, used, strict=True) if use),
-        markers=y[used],
-        residuals=transform.apply(x[used]) - y[used],
-        expected_sd=declared,
-        method=method,
-        reflection=mirror,
-        scale=scale,
-        noise=C,
-        outliers=outliers,
-        missing=missing,
-        excluded=tuple(exclude),
-        rejected=tuple(o.name for o in outliers) if robust else (),
-        findings=tuple(findings),
-    )
+        A residual that noise exceeds with probability `P_EXCESS` is explained in this order:
+        mirrored or permuted markers raise `RegistrationError` with both residuals; outliers and an
+        unexplained excess are findings. An outlier that moves the others by more than twice the
+        uncertainty of the fit without it raises `RegistrationError`, unless `robust`: least squares
+        are then repeated without the outliers, weights 0 or 1 (Rousseeuw & Leroy (1987), reweighted
+        least squares). Raises `RegistrationError` also for fewer than `FEWEST` markers, degenerate
+        sets, a set no thicker across its line than `LINE` times the noise, and unknown names.
+        """
+        x, y, kept, missing = _used(names, source, target, exclude)
+        C = _anisotropic(expected_sd, method)
+        declared = (
+            float(np.sqrt(np.linalg.eigvalsh(C)[-1]))
+            if C is not None
+            else float(np.asarray(expected_sd))
+        )
+        _check_settings(method, declared, x, y)
+        plain = _fitter(method, up)
+        fit = plain if C is None else partial(_weighted, first=plain, C=C)
+        noise = max(declared, measures.ROUNDING * float(spread(y)[0]))
+        mirror = measures.reflection(x, y, plain, _across(x.shape[1], up))
+        bound = noise * np.sqrt(measures.chi_square_bound(_freedom(y, method)) / len(y))
+        if mirror.proper > bound:
+            if measures.looks_mirrored(mirror, bound):
+                raise RegistrationError(
+                    f"markers seem mirrored: residual {1e3 * mirror.proper:.3g} mm by a rotation, "
+                    f"{1e3 * mirror.improper:.3g} mm by a reflection; check axis signs "
+                    "and handedness"
+                )
+            fault = label_fault(kept, x, y, plain, noise)
+            if fault is not None:
+                raise RegistrationError(fault)
+        outliers = measures.find_outliers(kept, x, y, noise, _scaled(method))
+        regular = ~np.isin(kept, [o.name for o in outliers])
+        if outliers and not robust:
+            _refuse_moved(outliers, x, y, regular, fit, noise, _scaled(method))
+        scale = measures.fitted_scale(x[regular], y[regular], noise)
+        findings = [
+            *_left_out(len(names), missing, tuple(exclude)),
+            *_outlying(outliers, robust),
+            *_other_size(scale, _scaled(method)),
+            *_excess(x[regular], y[regular], fit, noise, len(outliers), method),
+        ]
+        used = regular if robust else np.ones(len(kept), bool)
+        transform = fit(x[used], y[used])
+        return cls(
+            transform=transform,
+            names=tuple(n for n, use in zip(kept, used, strict=True) if use),
+            markers=y[used],
+            residuals=transform.apply(x[used]) - y[used],
+            expected_sd=declared,
+            method=method,
+            reflection=mirror,
+            scale=scale,
+            noise=C,
+            outliers=outliers,
+            missing=missing,
+            excluded=tuple(exclude),
+            rejected=tuple(o.name for o in outliers) if robust else (),
+            findings=tuple(findings),
+        )
 
 
 def _used(

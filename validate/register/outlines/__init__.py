@@ -6,7 +6,7 @@ Start with `outlines`.
 from validate.exports import lazily, names
 
 _HOMES = {
-    "outlines": ("Corner", "OutlineObservation", "NormalDistances", "merged", "observe_outlines"),
+    "outlines": ("Corner", "OutlineObservation", "NormalDistances", "merged"),
 }
 
 __all__ = names(_HOMES)

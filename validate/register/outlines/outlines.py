@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import shapely
@@ -345,6 +346,34 @@ class OutlineObservation:
         sd = self.sd * float(np.sqrt(share * along[0, 0] + (1 - share) * across))
         return Deviation(corner.quantity, off, "m", sd, 0.0, corner.words, simulated, measured)
 
+    @classmethod
+    def of(
+        cls,
+        contours: Contours,
+        wall: SurfaceSampler,
+        rest: float,
+        *,
+        name: str = "outline",
+        role: Role = "validates",
+        corners: tuple[Corner, ...] = (),
+        sd_t: float = 0.0,
+    ) -> Self:
+        """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
+        require_rigid(contours.pose, "outline")
+        return cls(
+            name,
+            role,
+            contours.t,
+            contours.outlines,
+            contours.pose,
+            contours.sd,
+            wall,
+            rest,
+            corners,
+            sd_t,
+            None if contours.each is None else contours.each[:, 0],
+        )
+
 
 @dataclass(frozen=True)
 class NormalDistances:
@@ -392,30 +421,3 @@ def merged(group: list[Deviation]) -> Deviation:
         first.definition, freedom=freedom, reference=reference,
         t=np.concatenate(times) if len(times) == len(group) else None,
     )  # fmt: skip
-
-
-def observe_outlines(
-    contours: Contours,
-    wall: SurfaceSampler,
-    rest: float,
-    *,
-    name: str = "outline",
-    role: Role = "validates",
-    corners: tuple[Corner, ...] = (),
-    sd_t: float = 0.0,
-) -> OutlineObservation:
-    """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
-    require_rigid(contours.pose, "outline")
-    return OutlineObservation(
-        name,
-        role,
-        contours.t,
-        contours.outlines,
-        contours.pose,
-        contours.sd,
-        wall,
-        rest,
-        corners,
-        sd_t,
-        None if contours.each is None else contours.each[:, 0],
-    )

@@ -1,7 +1,7 @@
 """Stored runs: their views by name, and queries over the tables of all, one run at a time.
 
-from validate.report import open_store
-open_store("reports").where(part="score", quantity="marker.*", statistic="rms").to_pandas()
+from validate.report.stored.tables import StoredTables
+StoredTables.open("reports").where(part="score", quantity="marker.*", statistic="rms").to_pandas()
 """
 
 import logging
@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from validate.catalogue import experiment_files, name_of, reports_of
 from validate.checksums import read_sealed
@@ -72,16 +72,18 @@ class StoredTables:
         """Return the rows of all runs as a DataFrame; raises `UsageError` without pandas."""
         return frame(self.rows())
 
+    @classmethod
+    def open(cls, folder: Path | str) -> Self:
+        """Return the stored runs below a folder of reports, or the one run that it holds.
 
-def open_store(folder: Path | str) -> StoredTables:
-    """Return the stored runs below a folder of reports, or the one run that it holds.
-
-    Raises `UsageError` where there is no such folder.
-    """
-    reports = Path(folder)
-    if not reports.is_dir():
-        raise UsageError(f"no folder of stored runs at {reports}; `validate run NAME` makes one")
-    return StoredTables(reports)
+        Raises `UsageError` where there is no such folder.
+        """
+        reports = Path(folder)
+        if not reports.is_dir():
+            raise UsageError(
+                f"no folder of stored runs at {reports}; `validate run NAME` makes one"
+            )
+        return cls(reports)
 
 
 def report_folders(reports: Path) -> list[Path]:

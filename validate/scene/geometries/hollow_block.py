@@ -16,7 +16,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
-from validate.scene.mesh import Mesh, boundary_facets, quadratic
+from validate.scene.mesh import Mesh, boundary_facets
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class HollowBlock:
             high = np.array([x[i.stop, 0], y[0, j.stop]]) + h / 4
             facets[f"cavity{k}"] = outside[((middle > low) & (middle < high)).all(axis=1)]
         mesh = Mesh(nodes, cells, "tri3", facets)
-        return quadratic(mesh) if self.element == "tri6" else mesh
+        return mesh.quadratic() if self.element == "tri6" else mesh
 
     def scaled(self, share: float) -> "HollowBlock":
         return replace(self, cells=round(share * self.cells))

@@ -18,13 +18,7 @@ from scipy.ndimage import map_coordinates
 
 from validate.arrays import Floats, Ints, checked
 from validate.errors import SceneError
-from validate.scene.mesh import (
-    Mesh,
-    boundary_facets,
-    cell_volumes,
-    kuhn_cells,
-    require_positive_cells,
-)
+from validate.scene.mesh import Mesh, boundary_facets, kuhn_cells, require_positive_cells
 
 # --- Shapes a block can hold: what the mesh asks of any of them, and one made of parallel
 # slices.
@@ -223,6 +217,51 @@ class Block:
     def sizes(self) -> Floats:
         return np.array([self.size_x, self.size_y, self.size_z])
 
+    def around(self, grid: tuple[int, int, int], shape: InclusionShape) -> Mesh:
+        """Linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
+
+        Facet sets: the six sides as of `scene.geometries.box` and "cavity". Raises `SceneError`
+        when the inclusion touches a face, is smaller than an element, or when the projection
+        inverts a cell.
+        """
+        if min(grid) < 4:
+            raise SceneError(f"mesh of {grid} nodes: expected at least 4 along each side")
+        if int(np.prod(grid)) > _MOST_NODES:
+            raise SceneError(
+                f"mesh of {grid} nodes: {int(np.prod(grid))} in total; expected at most "
+                f"{_MOST_NODES}: use a coarser mesh"
+            )
+        centre = np.array(shape.centre)
+        gaps = np.concatenate([centre - shape.reach, self.sizes - centre - shape.reach])
+        faces = [f"{axis} = {end}" for end in ("0", "max") for axis in "xyz"]
+        if gaps.min() <= 0:
+            raise SceneError(
+                f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
+                f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
+            )
+        spacing = np.maximum(centre, self.sizes - centre) * 2 / (np.array(grid) - 1)
+        h = float(np.delete(spacing, shape.axis).max())
+        if 2 * shape.radius < h:
+            raise SceneError(
+                f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element "
+                f"of {1e3 * h:.3g} mm; refine the mesh"
+            )
+        lines = []
+        for count, size, middle in zip(grid, self.sizes, shape.centre, strict=True):
+            s = np.linspace(0, 1, count)
+            lines.append(np.where(s <= 0.5, 2 * s * middle, middle + (2 * s - 1) * (size - middle)))
+        nodes = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+        cells = kuhn_cells(grid)
+        removed = (shape.distance(nodes)[cells] < -1e-9).any(axis=1)
+        if not removed.any():
+            raise SceneError(
+                f"no node of the {grid} mesh lies inside the inclusion of radius "
+                f"{1e3 * shape.radius:g} mm; refine the mesh"
+            )
+        mesh = _projected(nodes, cells[~removed], self, grid, shape)
+        require_positive_cells(mesh)
+        return mesh
+
 
 @dataclass(frozen=True)
 class Capsule:
@@ -274,51 +313,6 @@ class Capsule:
         return float(cylinder + 4 / 3 * np.pi * self.radius**3)
 
 
-def block_with_inclusion(block: Block, grid: tuple[int, int, int], shape: InclusionShape) -> Mesh:
-    """Linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
-
-    Facet sets: the six sides as of `scene.geometries.box` and "cavity". Raises `SceneError` when
-    the inclusion touches a face, is smaller than an element, or when the projection inverts a cell.
-    """
-    if min(grid) < 4:
-        raise SceneError(f"mesh of {grid} nodes: expected at least 4 along each side")
-    if int(np.prod(grid)) > _MOST_NODES:
-        raise SceneError(
-            f"mesh of {grid} nodes: {int(np.prod(grid))} in total; expected at most "
-            f"{_MOST_NODES}: use a coarser mesh"
-        )
-    centre = np.array(shape.centre)
-    gaps = np.concatenate([centre - shape.reach, block.sizes - centre - shape.reach])
-    faces = [f"{axis} = {end}" for end in ("0", "max") for axis in "xyz"]
-    if gaps.min() <= 0:
-        raise SceneError(
-            f"the inclusion reaches {-1e3 * gaps.min():.3g} mm beyond or touches the face "
-            f"{faces[int(gaps.argmin())]} of the block; move or shrink it"
-        )
-    spacing = np.maximum(centre, block.sizes - centre) * 2 / (np.array(grid) - 1)
-    h = float(np.delete(spacing, shape.axis).max())
-    if 2 * shape.radius < h:
-        raise SceneError(
-            f"the inclusion's diameter {2e3 * shape.radius:.3g} mm is smaller than an element of "
-            f"{1e3 * h:.3g} mm; refine the mesh"
-        )
-    lines = []
-    for count, size, middle in zip(grid, block.sizes, shape.centre, strict=True):
-        s = np.linspace(0, 1, count)
-        lines.append(np.where(s <= 0.5, 2 * s * middle, middle + (2 * s - 1) * (size - middle)))
-    nodes = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
-    cells = kuhn_cells(grid)
-    removed = (shape.distance(nodes)[cells] < -1e-9).any(axis=1)
-    if not removed.any():
-        raise SceneError(
-            f"no node of the {grid} mesh lies inside the inclusion of radius "
-            f"{1e3 * shape.radius:g} mm; refine the mesh"
-        )
-    mesh = _projected(nodes, cells[~removed], block, grid, shape)
-    require_positive_cells(mesh)
-    return mesh
-
-
 def _projected(
     nodes: Floats, cells: Ints, block: Block, grid: tuple[int, int, int], shape: InclusionShape
 ) -> Mesh:
@@ -347,7 +341,7 @@ def _projected(
         number = np.full(len(moved), -1)
         number[used] = np.arange(len(used))
         mesh = Mesh(moved[used], number[cells], "tet4", {k: number[f] for k, f in facets.items()})
-        flat = cell_volumes(mesh) <= _FLAT * np.median(cell_volumes(mesh))
+        flat = mesh.cell_volumes() <= _FLAT * np.median(mesh.cell_volumes())
         if not flat.any():
             break
         cells = cells[~flat]

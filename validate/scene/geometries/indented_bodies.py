@@ -15,7 +15,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.parameters import quantity, take_units
 from validate.scene.geometries.box import grid, member
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.places import OnPlane
 from validate.scene.scene import Support
 
@@ -181,7 +181,7 @@ class IndentedCylinder:
 def _bare(mesh: Mesh, element: Element) -> Mesh:
     """Without facet sets: those of a part would be named as sides of the whole body."""
     bare = replace(mesh, facets={})
-    return quadratic(bare) if element == "hex27" else bare
+    return bare.quadratic() if element == "hex27" else bare
 
 
 def _held(axis: tuple[float, ...]) -> tuple[Support, ...]:

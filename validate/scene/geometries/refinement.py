@@ -14,7 +14,7 @@ from scipy.spatial import KDTree
 from validate.arrays import Ints
 from validate.errors import SceneError, ValidateError
 from validate.places import cache
-from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic
+from validate.scene.mesh import Kind, Mesh
 from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.scene import Scene
 from validate.scene.shape_functions import CORNERS, LATTICE
@@ -49,7 +49,7 @@ def coarser(mesh: Mesh, times: int = 1) -> Mesh:
         triangles = mesh.surface[:, :3]
     else:
         triangles = np.concatenate([mesh.surface[:, [0, 1, 2]], mesh.surface[:, [0, 2, 3]]])
-    edge = _EDGE * float(np.cbrt(np.abs(cell_volumes(mesh)).mean()))
+    edge = _EDGE * float(np.cbrt(np.abs(mesh.cell_volumes()).mean()))
     if mesh.bricks:
         edge /= _EDGE
     diagonal = float(np.linalg.norm(np.ptp(mesh.nodes, axis=0)))
@@ -144,7 +144,7 @@ def refined(scene: Scene) -> Scene:
 
     Cells of linear elements. Raises `SceneError` for quadrilaterals.
     """
-    fine = quadratic(linear(scene.mesh))
+    fine = linear(scene.mesh).quadratic()
     d, kind = fine.dimension, linear(scene.mesh).kind
     inside, outside = _PARTS[d], _HALVES if d == 2 else _PARTS[2]
     if fine.bricks:
@@ -178,6 +178,6 @@ def of_element(scene: Scene, element: str) -> Scene:
         return scene if shaped else replace(scene, body=mesh)
     return replace(
         scene,
-        body=quadratic(mesh) if element == "P2" else mesh,
+        body=mesh.quadratic() if element == "P2" else mesh,
         dilatation="nodal_mean" if element == "MD" else "pointwise",
     )

@@ -16,7 +16,7 @@ from validate.arrays import Floats
 from validate.errors import UsageError
 from validate.parameters import known, quantity, take_units
 from validate.scene.geometries.box import box, member
-from validate.scene.mesh import Mesh, quadratic
+from validate.scene.mesh import Mesh
 from validate.scene.places import InBox, Place
 
 _GROWTH = 2.0  # logarithm of how much larger cells at the sides are than at the pads
@@ -65,7 +65,7 @@ class Sheet:
             np.rint(flat.nodes[:, c] * (len(a) - 1)).astype(int) for c, a in enumerate((x, y))
         )
         nodes = np.stack([x[column], y[row]], axis=1)
-        return quadratic(Mesh(nodes, flat.cells, "tri3", flat.facets))
+        return Mesh(nodes, flat.cells, "tri3", flat.facets).quadratic()
 
     def scaled(self, share: float) -> "Sheet":
         return replace(self, cells=member((self.cells,), share)[0])

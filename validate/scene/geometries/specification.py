@@ -28,9 +28,7 @@ from validate.scene.mesh import (
     Kind,
     Mesh,
     boundary_facets,
-    cell_volumes,
     kuhn_cells,
-    quadratic,
     require_nodes,
     require_positive_cells,
 )
@@ -218,11 +216,11 @@ class Geometry(Protocol):
 
 def cell_size(mesh: Mesh) -> float:
     """Return the edge m of a cube (in 2-D a square) as large as a mean cell."""
-    return float(np.abs(cell_volumes(mesh)).mean() ** (1 / mesh.dimension))
+    return float(np.abs(mesh.cell_volumes()).mean() ** (1 / mesh.dimension))
 
 
 def _of_order(mesh: Mesh, element: Kind) -> Mesh:
-    return quadratic(mesh) if element in ("tri6", "tet10", "hex27") else mesh
+    return mesh.quadratic() if element in ("tri6", "tet10", "hex27") else mesh
 
 
 @dataclass(frozen=True)
@@ -393,7 +391,7 @@ class MeshFile:
             mesh = refined(Scene(linear(mesh), Material(1.0, 0.3))).mesh
         if self.element == "linear":
             return linear(mesh)
-        return quadratic(mesh) if self.element == "quadratic" and mesh.order == 1 else mesh
+        return mesh.quadratic() if self.element == "quadratic" and mesh.order == 1 else mesh
 
     def scaled(self, share: float) -> "MeshFile":
         halvings = self.halvings + round(np.log2(share))
@@ -419,7 +417,7 @@ class SurfaceFile:
 
     def resolved(self, folder: Path) -> Mesh:
         mesh = filled(folder / self.file, self.unit, self.edge).mesh
-        return quadratic(mesh) if self.element == "quadratic" else mesh
+        return mesh.quadratic() if self.element == "quadratic" else mesh
 
     def scaled(self, share: float) -> "SurfaceFile":
         if self.edge <= 0:

@@ -14,7 +14,7 @@ from validate.errors import RecordingError, SceneError
 from validate.files import npz_arrays
 from validate.places import replacing
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.scene.mesh import Kind, Mesh, cell_volumes, require_positive_cells
+from validate.scene.mesh import Kind, Mesh, require_positive_cells
 from validate.scene.mesh_files.third_party_meshes import SUFFIXES as FOREIGN
 from validate.scene.mesh_files.third_party_meshes import (
     ForeignBody,
@@ -52,14 +52,14 @@ def filled(path: Path, unit: str, edge: float = 0.0, within: float = 1e-3) -> Fo
         raise SceneError(str(error)) from None
     try:
         mesh = Mesh((factor * found["points"]), found["cells.tetra"], "tet4")
-        if cell_volumes(mesh).sum() < 0:
+        if mesh.cell_volumes().sum() < 0:
             mesh = Mesh(mesh.nodes, mesh.cells[:, _TURN], "tet4")
         require_positive_cells(mesh)
 
     except SceneError as error:
         raise SceneError(f"{path.name}: {error}") from error
     volume, enclosed, may = (
-        float(cell_volumes(mesh).sum()), *(factor**3 * float(found[k]) for k in
+        float(mesh.cell_volumes().sum()), *(factor**3 * float(found[k]) for k in
                                            ("enclosed", "may_differ")),
     )  # fmt: skip
     share = f"{1e6 * volume:.4g} cm3 ({100 * (volume / enclosed - 1):+.2f} %)"

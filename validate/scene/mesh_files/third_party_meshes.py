@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import connected_components
 from validate.arrays import Floats, Ints
 from validate.errors import RecordingError, SceneError
 from validate.recording.formats.subprocess_decoder import decoded
-from validate.scene.mesh import Kind, Mesh, cell_volumes, quadratic, require_positive_cells
+from validate.scene.mesh import Kind, Mesh, require_positive_cells
 from validate.scene.mesh_files.abaqus_arrays import arrays as abaqus_arrays
 from validate.scene.shape_functions import EDGES
 from validate.units import in_si
@@ -34,7 +34,7 @@ def pieces(mesh: Mesh) -> Ints:
     joined = coo_matrix((np.ones(len(first)), (first, mesh.cells.ravel())), shape=(n, n))
     _, labels = connected_components(joined, directed=False)
     _, of = np.unique(labels[mesh.cells[:, 0]], return_inverse=True)
-    sizes = np.bincount(of, weights=np.abs(cell_volumes(mesh)))
+    sizes = np.bincount(of, weights=np.abs(mesh.cell_volumes()))
     return np.asarray(np.argsort(np.argsort(-sizes, kind="stable"))[of] + 1)
 
 
@@ -197,7 +197,7 @@ def _body(
     if "included" in found:
         told["included"] = str(found["included"])
     mesh = replace(mesh, facets=_facets(mesh, used, found))
-    return ForeignBody(quadratic(mesh) if shape in _BETWEEN else mesh, told)
+    return ForeignBody(mesh.quadratic() if shape in _BETWEEN else mesh, told)
 
 
 def _named(found: Mapping[str, NDArray[Any]]) -> dict[str, Ints]:
@@ -206,7 +206,7 @@ def _named(found: Mapping[str, NDArray[Any]]) -> dict[str, Ints]:
 
 def _turned(mesh: Mesh) -> tuple[Mesh, int]:
     """The mesh with its elements the right way round, and how many were not."""
-    wrong = cell_volumes(mesh) < 0
+    wrong = mesh.cell_volumes() < 0
     cells = mesh.cells.copy()
     cells[wrong] = cells[wrong][:, list(_TURNED[mesh.kind])]
     return replace(mesh, cells=cells), int(wrong.sum())

@@ -20,7 +20,7 @@ import numpy as np
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.cavity import volume_form
 from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.condense import Condensed, Imposed, WorkingSet, along, between
@@ -194,7 +194,7 @@ class NeedleLoop:
                 "accepts no drives; remove them"
             )
         tool = scene.tools[0]
-        rows = barycentric_rows(scene.mesh, np.array([tool.tip]))
+        rows = Rows.barycentric(scene.mesh, np.array([tool.tip]))
         if float(rows.outside[0]) < _ON:
             at = ", ".join(f"{1e3 * c:.3g}" for c in tool.tip)
             raise SceneError(

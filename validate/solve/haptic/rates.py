@@ -8,7 +8,6 @@ import numpy as np
 from validate.arrays import Floats, checked
 from validate.errors import UsageError
 
-HAPTIC_HZ = 1000.0  # force updates that a stiff contact needs to feel steady (paper 003, 3.5)
 DEVICE_HZ = 512.0  # of paper 000's haptic device (section 5.2)
 
 
@@ -19,6 +18,9 @@ class RealTime:
     A rate says nothing without its dt: `factor` is simulated over elapsed time, `ratio` how much
     of the stable step dt uses. Raises `UsageError` for numbers that are not positive.
     """
+
+    #: Force updates a second that a stiff contact needs to feel steady (paper 003, 3.5).
+    haptic_hz: ClassVar[float] = 1000.0
 
     rate_hz: float
     dt: float

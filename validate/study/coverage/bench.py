@@ -9,7 +9,7 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.convergence import Numerical
 from validate.compare.overall_verdict import judge_all
-from validate.compare.residual import Residual, reached_end, residuals, stacked
+from validate.compare.residual import Residual, reached_end, stacked
 from validate.compare.verdict import (
     Accept,
     Check,
@@ -331,7 +331,7 @@ class DrawBench:
                 self.runs.experiment, self.mine.method, method, self.runs.parameters,
                 self.mine.scene, seen,
             )  # fmt: skip
-        found = stacked(r for pair in zip(seen, runs, strict=True) for r in residuals(*pair))
+        found = stacked(r for pair in zip(seen, runs, strict=True) for r in Residual.of(*pair))
         return {
             s.name: r
             for s in self.given.stated for r in found.values()

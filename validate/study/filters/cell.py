@@ -15,7 +15,7 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.errors import ComparisonError, UsageError
 from validate.estimate.filters import FilterStepper
-from validate.estimate.measurements import Measurements, timetable
+from validate.estimate.measurements import Measurements
 from validate.fem.assembly.locate import Rows, probe_rows
 from validate.pipeline.run.case_solution import KeptFields
 from validate.solve.types import Run, Stepper, StepTimes
@@ -202,7 +202,7 @@ def _by_step(measurements: Measurements, offered: Measurements, t: Floats) -> Fl
     if measurements.names != offered.names:
         return None
     z = np.full((len(t), len(measurements.names)), np.nan)
-    for step, row in timetable(measurements, float(t[0])).z.items():
+    for step, row in measurements.timetable(float(t[0])).z.items():
         if step <= len(z):
             z[step - 1] = row
     return z

@@ -12,7 +12,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.estimate.measurements import NORMALS
-from validate.fem.assembly.locate import Rows, barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import System
 from validate.register.markers.markers import MarkerObservation
 from validate.register.observation import Observation, Selection
@@ -129,7 +129,7 @@ class MarkerTracks:
 
     def on(self, mesh: Mesh) -> "MarkerTracks":
         """The same markers, read from fields of another mesh of the body."""
-        return replace(self, rows=barycentric_rows(mesh, self.rest))
+        return replace(self, rows=Rows.barycentric(mesh, self.rest))
 
     def and_outlines(self, outlines: "Sequence[OutlineTracks]", mesh: Mesh) -> "MarkerTracks":
         """With the places of outlines, as last measured, as markers that move along normals."""

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import SuperLU
 from validate.arrays import Floats
 from validate.engine.store import key_of
 from validate.errors import ComparisonError, ValidateError
-from validate.fem.assembly.locate import barycentric_rows
+from validate.fem.assembly.locate import Rows
 from validate.fem.system import System, build
 from validate.pipeline.ladder.default import trial_of
 from validate.pipeline.ladder.ladder import Rival, Trial
@@ -230,7 +230,7 @@ def _march(trial: Trial, stepper: Stepper, dt: float, setup: float, steps: int =
 
 def _answered(stride: Stride, trial: Trial, system: System, run: Run) -> Stride:
     """The stride with what the run found at the ladder's frames."""
-    rows = barycentric_rows(system.scene.mesh, trial.points)
+    rows = Rows.barycentric(system.scene.mesh, trial.points)
     return replace(
         stride,
         u=np.array([rows.apply(u) for u in run.u]),
