@@ -8,13 +8,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.ladder.ladder import Ladder, Trial, marker_noise
-from validate.pipeline.ladder.references import ORDERS, still_best, still_pair
+from validate.pipeline.ladder.ladder import Ladder, LawPair, Trial, marker_noise
 from validate.recording.types import Recording
 from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
-from validate.solve.schemes import candidates
+from validate.solve.fluid.cavities import ExactPressure
+from validate.solve.static.newton import StaticNewton
 from validate.solve.study_entries import StillBody
 
 GRIDS = {7: (6, 7, 10), 9: (8, 9, 14), 11: (10, 12, 18)}  # cells along x, y, z by level
@@ -39,15 +39,16 @@ def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
         build=scene,
         size=lambda level: replace(tree.scene.body, cells=GRIDS[level]).cell_size,
         meshes={"P1": fine, "MD": fine, "P2": (7,) if quick else (7, 9)},
-        orders=ORDERS,
         steps=(rise / 6, rise / 240),
         inputs=lambda t: _DEEPEST / rise * t[:, None],
         frames=rise * np.array([1 / 3, 2 / 3, 1.0]),
         points=_points(scene("P1", 7, "linear").mesh),
         reference=("P2", 9 if quick else 11),
-        best=still_best(cavities=True),
-        solvers=candidates(StillBody(True, rise / 6, _TABLE, medium=9, coarse=7)),
-        pair=still_pair("P2", 7, rise / 6, cavities=True),
+        best=lambda dt: ExactPressure(),
+        solvers=StillBody(True, rise / 6, _TABLE, medium=9, coarse=7).candidates(),
+        pair=LawPair(
+            "P2", 7, rise / 6, lambda dt: ExactPressure(), lambda dt: StaticNewton(), "neo_hooke"
+        ),
         dynamic=False,
         rise_s=rise,
         noise=marker_noise(recording),

@@ -7,8 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.ladder.ladder import Rival, Trial
-from validate.pipeline.ladder.references import ORDERS, still_best, still_pair
+from validate.pipeline.ladder.ladder import LawPair, Rival, Trial
 from validate.recording.types import Recording
 from validate.scene.geometries.specification import Box
 from validate.scene.material import LawName
@@ -41,19 +40,20 @@ def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
         build=build,
         size=lambda level: size[0] / level,
         meshes={"P1": levels, "P2": two, "H8": levels, _REFERENCE: fewer},
-        orders={**ORDERS, _REFERENCE: 2.0},
         steps=(_WHOLE,),
         inputs=weight,
         frames=np.array([_WHOLE]),
         points=_points(size),
         reference=(_REFERENCE, finest),
-        best=still_best(cavities=False),
+        best=lambda dt: QuasiStatic(),
         solvers=(
             Rival("superposition", "static superposition", lambda dt: QuasiStatic(), stepped=False),
             Rival("large strain, Newton every step", "large strain",
                   lambda dt: StaticNewton("none"), law="neo_hooke"),
         ),
-        pair=still_pair(_REFERENCE, finest, _WHOLE, cavities=False),
+        pair=LawPair(
+            _REFERENCE, finest, _WHOLE, lambda dt: QuasiStatic(), lambda dt: StaticNewton()
+        ),
         dynamic=False,
         rise_s=_WHOLE,
     )  # fmt: skip

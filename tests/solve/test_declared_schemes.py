@@ -15,14 +15,14 @@ from validate.pipeline.ladder.default import trial_of
 from validate.solve import schemes
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.handles import LINEAR_DYNAMICS, Handles
-from validate.solve.schemes import candidates, steppings, steppings_for
+from validate.solve.schemes import steppings, steppings_for
 from validate.solve.study_entries import (
     RUNGS,
-    Asked,
     Rates,
     Rival,
     Stepping,
     StillBody,
+    StudyBody,
     SwingingBody,
     implicit_maps,
 )
@@ -33,7 +33,7 @@ from validate.study.tradeoff.study import again
 
 EXPERIMENTS = Path(__file__).parents[2] / "experiments"
 STEPS = (0.02, 0.01)
-BODIES: tuple[Asked, ...] = (
+BODIES: tuple[StudyBody, ...] = (
     SwingingBody(STEPS, 3, 5), SwingingBody(STEPS, 3, 5, "yeoh"),
     StillBody(True, 0.02, 0.01, 5, 3), StillBody(False, 0.02, 0.01, 5, 3),
 )  # fmt: skip
@@ -52,7 +52,7 @@ class Toy:
         return (Stepping("toy", "a toy", "consistent", implicit_maps("average")),)
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         return (Rival("a toy", "prefactored", Toy),) if isinstance(asked, SwingingBody) else ()
 
     def prepare(self, system: System) -> Stepper:
@@ -78,11 +78,11 @@ def test_names_of_step_maps_stay() -> None:
 
 
 @pytest.mark.parametrize("asked", BODIES)
-def test_candidates_are_their_scheme_and_rise_by_rung(asked: Asked) -> None:
+def test_candidates_are_their_scheme_and_rise_by_rung(asked: StudyBody) -> None:
     for scheme in schemes.SCHEMES:
         for one in getattr(scheme, "candidates", lambda _: ())(asked):
             assert isinstance(one.make(0.01), scheme)
-    rungs = [RUNGS.index(c.rung) for c in candidates(asked)]
+    rungs = [RUNGS.index(c.rung) for c in asked.candidates()]
     assert rungs == sorted(rungs)
 
 

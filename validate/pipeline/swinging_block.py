@@ -8,11 +8,10 @@ import numpy as np
 from validate.arrays import Floats
 from validate.pipeline.bodies.own_body import with_law
 from validate.pipeline.ladder.ladder import Trial
-from validate.pipeline.ladder.references import ORDERS, exact_in_time, swinging_pair
+from validate.pipeline.ladder.references import exact_in_time, swinging_pair
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName
 from validate.scene.scene import Scene
-from validate.solve.schemes import candidates
 from validate.solve.study_entries import SwingingBody
 
 _SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
@@ -49,14 +48,13 @@ def swinging_trial(
         build=build,
         size=lambda level: size[1] / level,
         meshes={"H8": fine, "P1": fine, "P2": (2,) if quick else (2, 4)},
-        orders=ORDERS,
         steps=steps[:2] if quick else steps,
         inputs=inputs,
         frames=frames,
         points=np.asarray(np.vstack([ends, axis]) * np.array(size)),
         reference=("P2", 4 if quick else 6),
         best=exact_in_time,
-        solvers=candidates(SwingingBody(steps, _SMALL, _MEDIUM)),
+        solvers=SwingingBody(steps, _SMALL, _MEDIUM).candidates(),
         pair=swinging_pair("P2", 2, steps[0]),
         dynamic=True,
         rise_s=0.0,

@@ -32,7 +32,7 @@ from validate.solve.static.proportional import Proportional
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.stretch_test import StretchTest
 from validate.solve.static.without_mechanics import Harmonic, RigidMotion
-from validate.solve.study_entries import RUNGS, Asked, Rival, Stepping
+from validate.solve.study_entries import Stepping
 from validate.solve.types import SceneSolver, Scheme
 
 _OWN: tuple[type[Scheme], ...] = (
@@ -102,15 +102,3 @@ def steppings() -> tuple[Stepping, ...]:
 def steppings_for(kind: Kind) -> tuple[Stepping, ...]:
     """Those that know such meshes."""
     return tuple(s for s in steppings() if not s.kinds or kind in s.kinds)
-
-
-def candidates(asked: Asked) -> tuple[Rival, ...]:
-    """Return the candidates that schemes declare for such a body, by their rung: what ladders
-    climb."""
-    none: tuple[Rival, ...] = ()
-
-    def declared(scheme: type[Scheme]) -> tuple[Rival, ...]:
-        return tuple(scheme.candidates(asked)) if hasattr(scheme, "candidates") else none
-
-    found = [c for scheme in SCHEMES for c in SCHEMES.answer(scheme, declared, none)]
-    return tuple(sorted(found, key=lambda c: RUNGS.index(c.rung)))

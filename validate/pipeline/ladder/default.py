@@ -34,7 +34,6 @@ from validate.pipeline.ladder.ladder import (
     squeezed,
 )
 from validate.pipeline.ladder.references import (
-    ORDERS,
     exact_in_ramps,
     still_best,
     still_pair,
@@ -50,7 +49,6 @@ from validate.solve.explicit.central import CentralDifference
 from validate.solve.handles import Handles
 from validate.solve.regions.krylov import TouchedKrylov
 from validate.solve.regions.scheme import AsyncRegions
-from validate.solve.schemes import candidates
 from validate.solve.study_entries import StillBody, SwingingBody
 from validate.solve.types import Scheme, State, Stepper
 
@@ -227,11 +225,11 @@ def _trial(own: ExperimentBody, quick: bool) -> Trial:
     law: LawName = "neo_hooke" if own_law == "linear" else own_law
     if loading.dynamic:
         pair = swinging_pair(element, coarse, dt[0], law)
-        every = candidates(SwingingBody(dt, coarse, medium, law))
+        every = SwingingBody(dt, coarse, medium, law).candidates()
     else:
         cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
         pair = still_pair(element, coarse, dt[0], cavities, law)
-        every = candidates(StillBody(cavities, dt[0], table, medium, coarse, law))
+        every = StillBody(cavities, dt[0], table, medium, coarse, law).candidates()
     solvers = tuple(s for s in every if _handles(s, dt[0], own.scene))
 
     def build(element: str, level: int, law: LawName) -> Scene:
@@ -241,7 +239,6 @@ def _trial(own: ExperimentBody, quick: bool) -> Trial:
         build=build,
         size=own.size,
         meshes=meshes,
-        orders={element: ORDERS[element] for element in {*meshes, reference[0]}},
         steps=dt,
         inputs=loading.inputs,
         frames=frames,

@@ -4,7 +4,7 @@ An experiment may declare its ladder; `pipeline.ladder.default` derives one from
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Self
 
@@ -25,6 +25,11 @@ from validate.solve.types import Scheme
 LARGEST = 1000  # unknowns of a body whose stability is mapped: all its modes are taken many times
 # Worst altitude ratios of its cells.
 QUALITY = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01)
+
+#: Orders of convergence of displacements in smooth fields, by element.
+ORDERS: Mapping[str, float] = MappingProxyType(
+    {"H8": 2.0, "Q4": 2.0, "P1": 2.0, "MD": 2.0, "P2": 3.0, "H27": 2.0}
+)
 
 # --- error against time ---------------------------------------------------------------------------
 
@@ -60,7 +65,6 @@ class Trial:
     build: Callable[[str, int, LawName], Scene]
     size: Callable[[int], float]
     meshes: Mapping[str, tuple[int, ...]]
-    orders: Mapping[str, float]
     steps: tuple[float, ...]
     inputs: Callable[[Floats], Floats]
     frames: Floats
@@ -71,6 +75,7 @@ class Trial:
     pair: LawPair | None
     dynamic: bool
     rise_s: float
+    orders: Mapping[str, float] = field(default_factory=lambda: ORDERS)
     noise: tuple[float, str] | None = None
     notes: tuple[str, ...] = ()
 

@@ -1,6 +1,6 @@
 """References of a ladder: solvers without error in time, and pairs of laws.
 
-Its candidates are those that schemes declare (`solve.schemes.candidates`).
+Its candidates are those that schemes declare (`StudyBody.candidates`).
 """
 
 from collections.abc import Callable
@@ -16,8 +16,6 @@ from validate.solve.static.newton import StaticNewton
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.types import Scheme
 
-# Of displacements in smooth fields.
-ORDERS = {"H8": 2.0, "Q4": 2.0, "P1": 2.0, "MD": 2.0, "P2": 3.0}
 _MODES = 60  # of the reference, beside the statics of the rest
 
 # --- with inertia ---------------------------------------------------------------------------------

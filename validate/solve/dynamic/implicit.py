@@ -40,9 +40,9 @@ from validate.solve.static.newton import StaticNewton
 from validate.solve.study_entries import (
     LOOSE,
     TETS,
-    Asked,
     Rival,
     Stepping,
+    StudyBody,
     SwingingBody,
     implicit_maps,
 )
@@ -74,7 +74,7 @@ class NewtonDynamics:
         )
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not isinstance(asked, SwingingBody):
             return ()
         return (

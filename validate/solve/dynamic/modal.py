@@ -30,7 +30,7 @@ from validate.solve.dynamic.linear import (
 )
 from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode, require_start
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.study_entries import Asked, Rates, Rival, Stepping, SwingingBody
+from validate.solve.study_entries import Rates, Rival, Stepping, StudyBody, SwingingBody
 from validate.solve.types import Scheme, State, Stepper
 
 # --- Steps of q'' + c q' + w^2 q = f for many modes at once: exact ones, and Newmark's rules.
@@ -141,7 +141,7 @@ class Modal:
         return (Stepping("modal", "all modes, each exactly", "consistent", _exact, order=0.0),)
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not isinstance(asked, SwingingBody):
             return ()
         return tuple(

@@ -40,11 +40,11 @@ from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import TOLERANCE, Iterative, Solved, SolverName
 from validate.solve.study_entries import (
     LOOSE,
-    Asked,
     Rates,
     Rival,
     Rung,
     Stepping,
+    StudyBody,
     SwingingBody,
     implicit_maps,
     newmark_maps,
@@ -137,7 +137,7 @@ class Newmark:
         )  # fmt: skip
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not isinstance(asked, SwingingBody):
             return ()
         prefactored: Rung = "prefactored"

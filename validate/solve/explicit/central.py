@@ -32,7 +32,15 @@ from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.handles import LARGE_DYNAMICS, Handles, require_handled
-from validate.solve.study_entries import TETS, Asked, Radii, Rates, Rival, Stepping, SwingingBody
+from validate.solve.study_entries import (
+    TETS,
+    Radii,
+    Rates,
+    Rival,
+    Stepping,
+    StudyBody,
+    SwingingBody,
+)
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _EXCESS = 0.05  # energy beyond the work done, as a share of the most work so far: divergence
@@ -89,7 +97,7 @@ class CentralDifference:
         )  # fmt: skip
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         """In single precision for the laws whose loops know it."""
         if not isinstance(asked, SwingingBody):
             return ()

@@ -33,9 +33,9 @@ from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
 from validate.solve.static.linear_solvers import Diagonal, Solver
 from validate.solve.study_entries import (
-    Asked,
     Rival,
     Stepping,
+    StudyBody,
     SwingingBody,
     UpdateName,
     explicit_maps,
@@ -80,7 +80,7 @@ class ExplicitLinear:
         )
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not isinstance(asked, SwingingBody):
             return ()
         return (

@@ -24,7 +24,7 @@ from validate.parameters import quantity
 from validate.solve.fluid.pressure_curve import NEWTON_STEPS, ROUNDING, cubic, least_slope, root_of
 from validate.solve.handles import GLUED, Handles, require_handled
 from validate.solve.static.quasi_static import LinearStepper, condensed
-from validate.solve.study_entries import Asked, Rival, StillBody
+from validate.solve.study_entries import Rival, StillBody, StudyBody
 from validate.solve.types import Ending, State, Stepper
 
 FLUID = Handles(("linear",), inertia=False, cavities=True, loads=False, contact=GLUED)
@@ -37,7 +37,7 @@ class NoFluid:
     handles: ClassVar[Handles] = FLUID
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not (isinstance(asked, StillBody) and asked.cavities):
             return ()
         return (
@@ -67,7 +67,7 @@ class ExactPressure:
     bulk_modulus: float | None = quantity(None, "Pa", "of the fluid; none: incompressible")
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not (isinstance(asked, StillBody) and asked.cavities):
             return ()
         name = "condensed, exact pressure"

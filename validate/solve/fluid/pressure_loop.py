@@ -33,7 +33,7 @@ from validate.solve.fluid.pressure_curve import (
 )
 from validate.solve.handles import Handles, require_handled
 from validate.solve.static.quasi_static import condensed
-from validate.solve.study_entries import Asked, Rival, StillBody
+from validate.solve.study_entries import Rival, StillBody, StudyBody
 from validate.solve.types import State, Stepper
 
 UpdateName = Literal["proportional", "retuned", "piecewise", "secant", "newton", "golden"]
@@ -62,7 +62,7 @@ class PressureLoop:
     )
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not (isinstance(asked, StillBody) and asked.cavities):
             return ()
         name = "condensed, paper's loop at 1 %"

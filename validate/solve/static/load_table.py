@@ -19,7 +19,7 @@ from validate.parameters import quantity
 from validate.scene.scene import Scene
 from validate.solve.handles import LARGE_STATICS, Handles
 from validate.solve.static.newton import StaticNewton
-from validate.solve.study_entries import Asked, Rival, StillBody
+from validate.solve.study_entries import Rival, StillBody, StudyBody
 from validate.solve.types import Ending, Scheme, State, Stepper
 
 _NODES = 4  # of the interpolation
@@ -36,7 +36,7 @@ class Tabulated:
     step: float = quantity(1e-3, "m", "spacing of the solved loads")
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         """Return a table of Newton's solutions over the load."""
         if not isinstance(asked, StillBody):
             return ()

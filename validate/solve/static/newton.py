@@ -39,7 +39,7 @@ from validate.fem.system import System, require_held
 from validate.parameters import quantity
 from validate.scene.scene import Load, Pressure, Scene, Weight
 from validate.solve.handles import LARGE_STATICS, Handles, require_handled
-from validate.solve.study_entries import Asked, Rival, StillBody
+from validate.solve.study_entries import Rival, StillBody, StudyBody
 from validate.solve.types import Ending, State, Stepper
 
 
@@ -229,7 +229,7 @@ class StaticNewton:
     )
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if not isinstance(asked, StillBody):
             return ()
         return (

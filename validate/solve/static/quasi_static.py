@@ -15,7 +15,7 @@ from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
 from validate.solve.dynamic.linear import InertialStepper, reactions
 from validate.solve.handles import LINEAR_DYNAMICS, Handles, require_handled
-from validate.solve.study_entries import Asked, Rival, Stepping, StillBody
+from validate.solve.study_entries import Rival, Stepping, StillBody, StudyBody
 from validate.solve.types import Ending, State, Stepper
 
 # --- Steppers that superpose response columns: what all linear quasi-static schemes share.
@@ -113,7 +113,7 @@ class QuasiStatic:
         )
 
     @staticmethod
-    def candidates(asked: Asked) -> tuple[Rival, ...]:
+    def candidates(asked: StudyBody) -> tuple[Rival, ...]:
         if isinstance(asked, StillBody) and asked.cavities:
             return ()
         name = "superposition" if isinstance(asked, StillBody) else "quasi-static"
