@@ -14,6 +14,7 @@ from validate.scene.material import LawName
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 from validate.solve.fluid.cavities import ExactPressure
+from validate.solve.schemes import SCHEMES
 from validate.solve.static.newton import StaticNewton
 from validate.solve.study_entries import StillBody
 
@@ -45,7 +46,7 @@ def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
         points=_points(scene("P1", 7, "linear").mesh),
         reference=("P2", 9 if quick else 11),
         best=lambda dt: ExactPressure(),
-        solvers=StillBody(True, rise / 6, _TABLE, medium=9, coarse=7).candidates(),
+        solvers=SCHEMES.candidates(StillBody(True, rise / 6, _TABLE, medium=9, coarse=7)),
         pair=LawPair(
             "P2", 7, rise / 6, lambda dt: ExactPressure(), lambda dt: StaticNewton(), "neo_hooke"
         ),

@@ -9,6 +9,7 @@ from validate.pipeline.ladder.references import (
     swinging_pair,
 )
 from validate.solve.fluid.cavities import ExactPressure
+from validate.solve.schemes import SCHEMES
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.study_entries import StillBody, SwingingBody
 
@@ -17,7 +18,7 @@ EXACT = {"quasi-static", "10 modes", "40 modes"}  # none of these has an error o
 
 
 def test_only_what_depends_on_the_step_takes_several() -> None:
-    rivals = SwingingBody(STEPS, small=3, medium=5, law="svk").candidates()
+    rivals = SCHEMES.candidates(SwingingBody(STEPS, small=3, medium=5, law="svk"))
     taken = dict.fromkeys((r.name for r in rivals), STEPS)
     taken |= dict.fromkeys(EXACT, STEPS[1:]) | {"large strain, implicit": STEPS[:1]}
     assert {r.name: r.steps("P1", 1, STEPS) for r in rivals} == taken
@@ -35,7 +36,7 @@ def test_only_what_depends_on_the_step_takes_several() -> None:
 
 def test_statics_are_stepped_by_newton_alone() -> None:
     for cavities, count in ((True, 5), (False, 3)):
-        rivals = StillBody(cavities, 0.02, 0.01, medium=5, coarse=3).candidates()
+        rivals = SCHEMES.candidates(StillBody(cavities, 0.02, 0.01, medium=5, coarse=3))
         assert len(rivals) == count
         stepped = {r.name for r in rivals if r.steps("P1", 1, STEPS) == STEPS[:1]}
         assert stepped == {"large strain, Newton every step"}

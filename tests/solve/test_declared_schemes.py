@@ -1,5 +1,6 @@
 """The one list of schemes: step maps and candidates come from their classes, a new one's too."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -15,7 +16,7 @@ from validate.pipeline.ladder.default import trial_of
 from validate.solve import schemes
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.handles import LINEAR_DYNAMICS, Handles
-from validate.solve.schemes import steppings, steppings_for
+from validate.solve.schemes import SCHEMES, steppings, steppings_for
 from validate.solve.study_entries import (
     RUNGS,
     Rates,
@@ -60,9 +61,11 @@ class Toy:
 
 
 @pytest.fixture
-def toy(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = (*schemes.SCHEMES.own, Toy)
-    monkeypatch.setattr(schemes, "SCHEMES", replace(schemes.SCHEMES, own=own))
+def toy() -> Iterator[None]:
+    own = SCHEMES.own
+    object.__setattr__(SCHEMES, "own", (*own, Toy))
+    yield
+    object.__setattr__(SCHEMES, "own", own)
 
 
 def test_names_of_step_maps_stay() -> None:
@@ -79,14 +82,14 @@ def test_names_of_step_maps_stay() -> None:
 
 @pytest.mark.parametrize("asked", BODIES)
 def test_candidates_are_their_scheme_and_rise_by_rung(asked: StudyBody) -> None:
-    for scheme in schemes.SCHEMES:
+    for scheme in SCHEMES:
         for one in getattr(scheme, "candidates", lambda _: ())(asked):
             assert isinstance(one.make(0.01), scheme)
-    rungs = [RUNGS.index(c.rung) for c in asked.candidates()]
+    rungs = [RUNGS.index(c.rung) for c in SCHEMES.candidates(asked)]
     assert rungs == sorted(rungs)
 
 
-@pytest.mark.parametrize("scheme", schemes.SCHEMES, ids=lambda s: s.__name__)
+@pytest.mark.parametrize("scheme", SCHEMES, ids=lambda s: s.__name__)
 def test_a_linear_scheme_with_inertia_declares_a_step_map(scheme: type[Scheme]) -> None:
     """So that stability maps it; those that are driven by a tool or in regions march otherwise."""
     marches = scheme.handles.inertia and scheme.handles.law == ("linear",)
@@ -126,7 +129,7 @@ def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """`study choose` runs its candidates: as the only scheme in the list it is the choice."""
-    monkeypatch.setattr(schemes, "SCHEMES", replace(schemes.SCHEMES, own=(Toy,)))
+    monkeypatch.setattr(schemes, "SCHEMES", replace(SCHEMES, own=(Toy,)))
     pulled, here = load_file(experiment_file(tmp_path)), Where(workers=0)
     climb = Climb(pulled, quick=True, out=tmp_path, where=here)
     found = choose(

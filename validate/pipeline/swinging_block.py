@@ -12,6 +12,7 @@ from validate.pipeline.ladder.references import exact_in_time, swinging_pair
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import LawName
 from validate.scene.scene import Scene
+from validate.solve.schemes import SCHEMES
 from validate.solve.study_entries import SwingingBody
 
 _SMALL, _MEDIUM = 2, 4  # finest meshes of baselines that solve anew every step
@@ -54,7 +55,7 @@ def swinging_trial(
         points=np.asarray(np.vstack([ends, axis]) * np.array(size)),
         reference=("P2", 4 if quick else 6),
         best=exact_in_time,
-        solvers=SwingingBody(steps, _SMALL, _MEDIUM).candidates(),
+        solvers=SCHEMES.candidates(SwingingBody(steps, _SMALL, _MEDIUM)),
         pair=swinging_pair("P2", 2, steps[0]),
         dynamic=True,
         rise_s=0.0,

@@ -32,7 +32,7 @@ from validate.solve.static.proportional import Proportional
 from validate.solve.static.quasi_static import QuasiStatic
 from validate.solve.static.stretch_test import StretchTest
 from validate.solve.static.without_mechanics import Harmonic, RigidMotion
-from validate.solve.study_entries import Stepping
+from validate.solve.study_entries import RUNGS, Rival, Stepping, StudyBody
 from validate.solve.types import SceneSolver, Scheme
 
 _OWN: tuple[type[Scheme], ...] = (
@@ -57,7 +57,23 @@ _OWN: tuple[type[Scheme], ...] = (
     TouchedKrylov,
 )
 
-SCHEMES: Registry[type[Scheme]] = Registry(
+
+class Schemes(Registry[type[Scheme]]):
+    """The schemes, with what studies ask all of them."""
+
+    def candidates(self, asked: StudyBody) -> tuple[Rival, ...]:
+        """Return the candidates that schemes declare for such a body, by their rung: what ladders
+        climb."""
+        none: tuple[Rival, ...] = ()
+
+        def declared(scheme: type[Scheme]) -> tuple[Rival, ...]:
+            return tuple(scheme.candidates(asked)) if hasattr(scheme, "candidates") else none
+
+        found = [c for scheme in self for c in self.answer(scheme, declared, none)]
+        return tuple(sorted(found, key=lambda c: RUNGS.index(c.rung)))
+
+
+SCHEMES = Schemes(
     "schemes",
     _OWN,
     lambda scheme: scheme.__name__,

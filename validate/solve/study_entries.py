@@ -5,13 +5,13 @@ entries of order 1 whatever the step. Linear solvers (direct, CG, Gauss-Seidel) 
 scheme declares its own in `steppings`; `solve.schemes.steppings` has them all.
 
 Candidates of a ladder: settings of a scheme in studies of error against time. Every scheme declares
-its own in `candidates`, for a swinging body or one at rest; `StudyBody.candidates` has them
+its own in `candidates`, for a swinging body or one at rest; `SCHEMES.candidates` has them
 all, by their rung.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -152,24 +152,8 @@ class Rival:
         return tuple(dt for dt in own if dt >= self.shortest * (1 - 1e-9))
 
 
-class StudyBody:
-    """A body that a ladder asks the schemes for candidates."""
-
-    def candidates(self) -> tuple[Rival, ...]:
-        """Return those that schemes declare for such a body, by their rung."""
-        from validate.solve.schemes import SCHEMES  # which imports this module
-
-        none: tuple[Rival, ...] = ()
-
-        def declared(scheme: type[Any]) -> tuple[Rival, ...]:
-            return tuple(scheme.candidates(self)) if hasattr(scheme, "candidates") else none
-
-        found = [c for scheme in SCHEMES for c in SCHEMES.answer(scheme, declared, none)]
-        return tuple(sorted(found, key=lambda c: RUNGS.index(c.rung)))
-
-
 @dataclass(frozen=True)
-class SwingingBody(StudyBody):
+class SwingingBody:
     """A body with inertia at these `steps` s, the longest first. Baselines that solve anew at every
     step run on meshes up to `small`, dense ones up to `medium`; `law` is that at large strain."""
 
@@ -180,7 +164,7 @@ class SwingingBody(StudyBody):
 
 
 @dataclass(frozen=True)
-class StillBody(StudyBody):
+class StillBody:
     """A body in statics, with fluid in `cavities` or without. A `table` of load runs on meshes up
     to `medium`; Newton at every step on `coarse` ones, in the largest `increment` s only."""
 
@@ -190,3 +174,6 @@ class StillBody(StudyBody):
     medium: int
     coarse: int
     law: LawName = "neo_hooke"
+
+
+StudyBody = SwingingBody | StillBody

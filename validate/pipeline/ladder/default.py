@@ -49,6 +49,7 @@ from validate.solve.explicit.central import CentralDifference
 from validate.solve.handles import Handles
 from validate.solve.regions.krylov import TouchedKrylov
 from validate.solve.regions.scheme import AsyncRegions
+from validate.solve.schemes import SCHEMES
 from validate.solve.study_entries import StillBody, SwingingBody
 from validate.solve.types import Scheme, State, Stepper
 
@@ -225,11 +226,11 @@ def _trial(own: ExperimentBody, quick: bool) -> Trial:
     law: LawName = "neo_hooke" if own_law == "linear" else own_law
     if loading.dynamic:
         pair = swinging_pair(element, coarse, dt[0], law)
-        every = SwingingBody(dt, coarse, medium, law).candidates()
+        every = SCHEMES.candidates(SwingingBody(dt, coarse, medium, law))
     else:
         cavities, table = bool(own.scene.cavities), float(np.abs(loading.y).max()) / 6
         pair = still_pair(element, coarse, dt[0], cavities, law)
-        every = StillBody(cavities, dt[0], table, medium, coarse, law).candidates()
+        every = SCHEMES.candidates(StillBody(cavities, dt[0], table, medium, coarse, law))
     solvers = tuple(s for s in every if _handles(s, dt[0], own.scene))
 
     def build(element: str, level: int, law: LawName) -> Scene:

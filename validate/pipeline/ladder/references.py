@@ -1,6 +1,6 @@
 """References of a ladder: solvers without error in time, and pairs of laws.
 
-Its candidates are those that schemes declare (`StudyBody.candidates`).
+Its candidates are those that schemes declare (`SCHEMES.candidates`).
 """
 
 from collections.abc import Callable
