@@ -14,7 +14,7 @@ from validate.errors import RecordingError
 from validate.recording.images.image import coverage
 from validate.recording.outlines.outline import extract_outline
 from validate.register.outlines.outlines import normal_distances
-from validate.twin.ultrasound import Scanner, Target, b_mode
+from validate.twin.ultrasound import Scanner, Target
 
 LEVELS = (-12.0, -18.0, -24.0, -30.0)  # dB of the inclusion below tissue
 SHADOWS = (0.0, 6.0, 12.0)  # dB in the middle of an edge shadow
@@ -65,7 +65,7 @@ def cyst_frame(seed: int, level: float, shadow: float) -> CystFrame:
         second=cyst_outline(corner, 2e-3, rng) if seed % 2 and apart else None,
         plate=0.6e-3 if seed % 3 == 0 else None,
     )
-    image = b_mode(scanner, target, rng)
+    image = scanner.b_mode(target, rng)
     return CystFrame(image, (m_per_px, m_per_px), outline, level, shadow)
 
 
@@ -122,7 +122,7 @@ def false_alarms(count: int) -> int:
     """How many images of tissue alone are given an outline."""
     found = 0
     for i in range(count):
-        image = b_mode(Scanner(), Target(None, texture=1.5), np.random.default_rng([7, i]))
+        image = Scanner().b_mode(Target(None, texture=1.5), np.random.default_rng([7, i]))
         try:
             extract_outline(image, (1e-4, 1e-4))
             found += 1

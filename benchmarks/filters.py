@@ -20,7 +20,7 @@ from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.filters import Filter
 from validate.estimate.measurements import Measurements
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
@@ -104,7 +104,7 @@ def filters(dt: float) -> dict[str, tuple[Filter, bool]]:
 def table(steps: int) -> str:
     """The whole table in Markdown."""
     system = cube()
-    limit = critical_step(system)
+    limit = CriticalStep.of(system)
     gap = int(np.ceil(1 / RATE / limit.recommended))
     dt = 1 / RATE / gap
     plain = CentralDifference(dt).prepare(system)

@@ -27,7 +27,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.march import march, output_frames
 from validate.solve.static.newton import StaticNewton
-from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of
 
 SIDE, CELLS = 0.03, 11
 HOLDS = (2e-3, 4e-3, 6e-3)  # m
@@ -59,7 +59,7 @@ def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
     }
     at = {name: np.array(x) for name, x in FIDUCIALS.items()}
     camera = Camera(2e-5, 1, still=10_000)
-    return record_tracked(Origin("block", 7, True), points_of(run, true), at, camera, readings)
+    return Origin("block", 7, True).record(points_of(run, true), at, camera, readings)
 
 
 def place(recording: Recording, p: Any, its: Scene) -> Registered:

@@ -15,7 +15,7 @@ from validate.compare.verdict import Accept
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.fem.system import build as build_system
 from validate.parameters import quantity
-from validate.register.scene_registration import follow_signal
+from validate.register.registration import Registered
 from validate.pipeline.experiment.experiment import Experiment, Twin
 from validate.pipeline.run.method_run import Truth
 from validate.pipeline.experiment.method import Method
@@ -26,7 +26,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.march import march
 from validate.solve.dynamic.newmark import Newmark
-from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of
 
 STEPS, DT = 40, 0.01
 FIXED = {n: np.array(x) for n, x in
@@ -89,7 +89,7 @@ def record(p, progress):
     made, done = run(p)
     twin = p.settings.twin
     camera = Camera(float(np.sqrt(twin.noise)), missing=twin.missing, still=10_000)
-    return record_tracked(Origin("pulled", twin.seed, True), points_of(done, made), FIXED,
+    return Origin("pulled", twin.seed, True).record(points_of(done, made), FIXED,
                           camera, {"pull": Reading(done.traces["pull.force"].y, "N")})
 
 
@@ -106,7 +106,7 @@ EXPERIMENT = Experiment(
              "plain": Method("solver", Newmark())},
     accepted=("kf",), accept=(Accept("top", 1e-3, "made for tests"),),
     load=lambda p, folder: (stamped(record(p, lambda _: None), p),),
-    place=lambda recording, p, made: follow_signal(recording, made.mesh, "pull", "N"),
+    place=lambda recording, p, made: Registered.following(recording, made.mesh, "pull", "N"),
     sets=lambda p, seen: {"dt": DT}, axis="z", reference="plain",
     twin=Twin(record, truth, kind="same model", seed=5),
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.recording.types import Frames
-from validate.twin.ultrasound import Scanner, Target, b_mode
+from validate.twin.ultrasound import Scanner, Target
 
 _ANGLES = np.linspace(0, 2 * np.pi, 180, endpoint=False)
 
@@ -71,7 +71,7 @@ def sweep_frames(
     """One image at each position (n,) m along z, one a second, in the frame "phantom"."""
     rng = np.random.default_rng(seed)
     images = tuple(
-        b_mode(scanner, Target(shape.section(float(z)), level=level, shadow=shadow), rng)
+        scanner.b_mode(Target(shape.section(float(z)), level=level, shadow=shadow), rng)
         for z in positions
     )
     scale = (scanner.m_per_px, scanner.m_per_px)

@@ -13,7 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, Heat, NumberTable
-from validate.fem.critical import lanczos_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
@@ -78,7 +78,7 @@ def _step_by_eq_4(tree: Tree) -> float:
     body, material = tree.scene.body, tree.scene.material
     system = build(bar(tree))
     K = system.K[system.free][:, system.free]
-    exact = lanczos_step(lambda x: K @ x, system.masses[system.free], products=60).limit
+    exact = CriticalStep.by_lanczos(lambda x: K @ x, system.masses[system.free], products=60).limit
     edge: float = body.size[0] / body.cells[0]
     return edge * float(np.sqrt((material.rho or 0.0) / material.E)) / exact
 

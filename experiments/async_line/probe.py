@@ -12,7 +12,7 @@ from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.scene import Scene
 from validate.twin.sensors import LoadCell, signal, streams
-from validate.twin.tracker import START_NS
+from validate.twin.tracker import Origin
 
 PROBE = "probe"
 
@@ -62,7 +62,7 @@ def probed(
     return Recording(
         name,
         Source(name, "", 0, "made in memory"),
-        START_NS,
+        Origin.start_ns,
         signals={
             PROBE: Signal(t, path.round(9), "m", 0.0, "scene"),  # a nanometre: short files
             "force": signal(t[some], force[some], "N", cell.noise, "scene", rng),

@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.compare.shapes.two_fields import FieldScores
 from validate.fem.system import System
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
@@ -36,7 +37,6 @@ from ..needle_block.errors import (
     static_exhibit,
     sum_ratio,
     switches_exhibit,
-    units_in,
 )
 from ..needle_block.further_exhibits import PaperBody, beyond
 from ..needle_block.penalty import NEARLY, Squeezed
@@ -195,7 +195,7 @@ def _limits(p: Tree) -> Exhibit:
 def _mesh_error(finer: Mapping[str, Errors], said: str) -> Exhibit:
     table = instants_table(
         "mesh_error", "Against the implicit run on a mesh twice as fine.", finer,
-        ("E_n", "E_i"), units_in(3),
+        ("E_n", "E_i"), FieldScores.units(3),
     )  # fmt: skip
     return Exhibit("mesh-error", "Errors of the mesh", (said,), (table,))
 

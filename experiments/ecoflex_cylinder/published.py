@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from validate.compare.published import Figure, Values
-from validate.identify.modulus import loading
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Recording
@@ -101,7 +100,7 @@ def _tenth(recordings: Sequence[Recording], tree: Tree) -> float:
     """A tenth of the force N at the linear law's strain, mean over the logs."""
     forces = []
     for recording in recordings:
-        log = loading(recording)
-        last = int(np.argmax(log.d >= tree.settings.limit_linear * size(tree).height))
-        forces.append(float(log.force[last]))
+        moved, force = recording.signal("displacement", "m"), recording.signal("force", "N")
+        last = int(np.argmax(moved.y[:, 0] >= tree.settings.limit_linear * size(tree).height))
+        forces.append(float(np.interp(moved.t[last], force.t, force.y[:, 0])))
     return 0.1 * float(np.mean(forces))

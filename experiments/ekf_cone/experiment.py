@@ -9,7 +9,7 @@ from validate.compare.verdict import Accept
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.pipeline.experiment.experiment import Case, Experiment, Twin, Uncertainty, vary
-from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.pipeline.experiment.method import Method
 from validate.scene.geometries.specification import Cone
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Load, Probe, Scene, Support
@@ -64,14 +64,18 @@ METHODS = {
         "node-level EKF of U_t and U_t-dt", NodeEKF(block="companion"), PUSHED, A
     ),
     "reduced_modes": Method(
-        "reduced EKF, 20 modes and load bias", ReducedEKF(), PUSHED, A, chosen=WALK_UNRECORDED
+        "reduced EKF, 20 modes and load bias",
+        ReducedEKF(),
+        PUSHED,
+        A,
+        chosen=Method.walk_unrecorded,
     ),
     "reduced_pod": Method(
         "reduced EKF, POD and load bias",
         ReducedEKF(basis="pod", shapes=5),
         PUSHED,
         A,
-        chosen=WALK_UNRECORDED,
+        chosen=Method.walk_unrecorded,
     ),
 }
 

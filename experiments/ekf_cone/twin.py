@@ -29,7 +29,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.scene import Drive, Scene, Support
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Stepper
-from validate.twin.tracker import Camera, Origin, Points, Reading, record_tracked
+from validate.twin.tracker import Camera, Origin, Points, Reading
 
 _FIRST = 1e-4  # of the height: the compression that tells the stiffness at rest
 # x, y of the markers on the side
@@ -97,8 +97,7 @@ def record_cone(cone: Cone, settings: ConeTwin, progress: Callable[[str], None])
     t = np.arange(round(settings.duration * settings.rate) + 1) / settings.rate
     force = settings.force * t / settings.duration
     compression, u = table.at(force)
-    recording = record_tracked(
-        Origin("ekf_cone", settings.seed, False, _declared(settings, scene.mesh)),
+    recording = Origin("ekf_cone", settings.seed, False, _declared(settings, scene.mesh)).record(
         Points(t, tuple(markers), np.array(list(markers.values())), u),
         fiducial_places(cone),
         Camera(settings.sd_marker, missing=settings.missing),

@@ -7,7 +7,7 @@ import numpy as np
 from validate.compare.exhibit import Exhibit
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.run.method_run import Cases
@@ -49,7 +49,7 @@ def tell_cube(parameters: Any, cases: Cases, progress: Progress) -> ReportAdditi
     progress("locking")
     locked = locking_table(scene, NU)
     numbers = {
-        "critical_step": critical_step(build_system(scene)).lanczos,
+        "critical_step": CriticalStep.of(build_system(scene)).lanczos,
         "nodes": float(len(scene.mesh.nodes)),
         "cells": float(len(scene.mesh.cells)),
         "fields_apart": fields_apart(cases[""], ("ekf_held", "nfem")),

@@ -11,7 +11,7 @@ from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.estimate.reduced.reduced_ekf import ReducedEKF
 from validate.pipeline.experiment.experiment import Case, Experiment, Twin
-from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.pipeline.experiment.method import Method
 from validate.scene.geometries.specification import MeshFile
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
@@ -27,7 +27,7 @@ A = ("node_A",)
 # m/s^0.5, set on this twin: the filter's default of 1e-6 lets undamped shapes drift for the whole
 # ramp, so that it claims .046 mm at node B, seven times its error there and above the limit.
 PROCESS = 2e-7
-CHOSEN = f"process noise 2e-7 m/s^0.5 chosen on this twin; {WALK_UNRECORDED}"
+CHOSEN = f"process noise 2e-7 m/s^0.5 chosen on this twin; {Method.walk_unrecorded}"
 METHODS = {
     "nfem": Method("NFEM, central difference", CentralDifference()),
     "nfem_printed": Method("NFEM at the printed 1 ms", CentralDifference(), stride=5),

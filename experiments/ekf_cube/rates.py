@@ -15,7 +15,7 @@ from scipy import sparse
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.estimate.measurements import Measurements
-from validate.fem.critical import lanczos_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
@@ -79,7 +79,7 @@ def _cube(material: Material, side: float, n: int) -> Scene:
 def _critical(system: System) -> float:
     free = system.free
     K = sparse.csr_array(system.K[free][:, free])
-    return lanczos_step(lambda x: K @ x, system.masses[free]).limit
+    return CriticalStep.by_lanczos(lambda x: K @ x, system.masses[free]).limit
 
 
 def _looks(system: System, dt: float) -> Measurements:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from validate.compare.exhibit import Entry, NumberTable
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.run.method_run import MethodRun
 from validate.scene.scene import Load, Scene
@@ -47,7 +47,7 @@ def readings_table(scene: Scene, force: float, axis: str) -> NumberTable:
 
 def steps_table(scene: Scene, printed: float) -> NumberTable:
     """Critical steps by four rules, and the printed step beside."""
-    limits = critical_step(build_system(scene))
+    limits = CriticalStep.of(build_system(scene))
     named: tuple[tuple[str, float | None], ...] = (
         ("2/omega_max by Lanczos (the limit)", limits.lanczos),
         ("recommended: limit less margin", limits.recommended),

@@ -12,7 +12,6 @@ from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.scene.scene import Scene
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import output_frames
@@ -44,7 +43,7 @@ class PushedCube:
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "push", "N", tree.settings.registration)
+    return Registered.following(recording, scene.mesh, "push", "N", tree.settings.registration)
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:

@@ -3,12 +3,11 @@
 import numpy as np
 
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
-from validate.fem.critical import cell_altitudes, critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
-from validate.report.scenes.points import node_sets_picture
 from validate.scene.scene import Scene
 
 from ..ekf_cube.published import PRINTED_LIVER_STEP
@@ -19,6 +18,7 @@ from ..ekf_cube.tables import (
     steps_table,
 )
 from .body import watched
+from .node_sets import node_sets_picture
 from .twin import FOLDER
 
 NU = (0.45, 0.49, 0.499)  # what locking is shown at
@@ -50,7 +50,7 @@ def tell_liver(tree: Tree, cases: Cases, progress: Progress) -> ReportAdditions:
         (readings, limits, locked),
     )
     numbers = {
-        "critical_step": critical_step(build_system(scene)).lanczos,
+        "critical_step": CriticalStep.of(build_system(scene)).lanczos,
         "nodes": float(len(scene.mesh.nodes)),
         "tetrahedra": float(len(scene.mesh.cells)),
         "duration": float(main["nfem"].seen.t[-1]),
@@ -104,7 +104,10 @@ def _ramp_words(plain: MethodRun, readings: NumberTable) -> str:
 
 
 def _sliver_words(scene: Scene) -> str:
-    flat = cell_altitudes(scene)
+    x = scene.mesh.nodes[scene.mesh.corners]
+    slopes = np.linalg.inv(x[:, 1:] - x[:, :1])  # of the shape functions of all corners but one
+    slopes = np.concatenate([-slopes.sum(axis=2, keepdims=True), slopes], axis=2)
+    flat = 1 / np.linalg.norm(slopes, axis=1).max(axis=1)
     count = int((flat < _SLIVER * np.median(flat)).sum())
     return (
         f"{count} of {len(flat)} cells are slivers (altitude below {_SLIVER:g} of the median "

@@ -18,7 +18,6 @@ from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.scene.geometries.refinement import refined
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
@@ -88,7 +87,7 @@ def _place(mesh: Mesh, node: int) -> tuple[float, ...]:
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "pull", "N", tree.settings.registration)
+    return Registered.following(recording, scene.mesh, "pull", "N", tree.settings.registration)
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:

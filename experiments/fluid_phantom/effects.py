@@ -3,7 +3,7 @@
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import EffectSpec, Input, Variant, vary
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import INPUTS as SHARED
+from validate.pipeline.plates.inclusion import InclusionTest
 
 _FINER = 1.25  # times the cells along every edge: the finest mesh
 #: 8 x 9 x 14 cells have no common factor: within 5 % these grids are similar. Order 2: corners at
@@ -25,7 +25,7 @@ def _rounder(tree: Tree, z: float) -> Tree:
 
 
 INPUTS = (
-    *SHARED,
+    *InclusionTest.inputs(),
     vary("registration.image_shift_x", "absolute ranges.pose", "image pose x",
          "image plane along the stage; the meshed inclusion follows"),
     vary("registration.image_shift_z", "absolute ranges.pose", "image pose z",

@@ -12,7 +12,7 @@ from validate.compare.score import Score
 from validate.parameters import with_given
 from validate.pipeline.experiment.experiment import Identified, Variant
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.plates.inclusion import rubbing
+from validate.pipeline.plates.inclusion import InclusionTest
 
 from .effects import MESHES, finest
 from .friction_profile import Interval, profile_interval
@@ -44,7 +44,7 @@ def friction_from_rise(parameters: Tree, method: str, solves: SolvesVariants) ->
 
 
 def _rubbing(p: Tree, share: float, _: Tree) -> Any:
-    return with_given(rubbing(p, share), _LINEAR)
+    return with_given(InclusionTest.rubbing(p, share), _LINEAR)
 
 
 def _weighed(found: Sequence[Residual]) -> Floats:

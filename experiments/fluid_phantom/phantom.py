@@ -9,18 +9,19 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from validate.arrays import rms
+from validate.errors import RecordingError
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree, beside
 from validate.pipeline.plates.inclusion import (
     InclusionRanges,
     InclusionRegistration,
+    InclusionTest,
     Streams,
-    outlined,
-    placed,
 )
-from validate.recording.outlines.outline import outlines_of
-from validate.recording.types import Recording
+from validate.recording.outlines.outline import extract_outline
+from validate.recording.types import Contours, Frames, Recording
 from validate.register.markers.markers import Together
 from validate.register.observation import Observation
 from validate.register.outlines.outlines import Corner
@@ -75,16 +76,36 @@ def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 
 def read(recording: Recording, tree: Tree) -> Recording:
     """The recording with the outlines that are to be used."""
-    recording = outlined(recording, tree)
+    recording = InclusionTest.read(recording, tree)
     if tree.settings.outlines == "recorded":
         return recording
-    outlines = outlines_of(recording.frame(IMAGES), images=IMAGES)
+    outlines = outlines_in(recording.frame(IMAGES), IMAGES)
     return replace(recording, contours={**recording.contours, "outline": outlines})
+
+
+def outlines_in(frames: Frames, topic: str) -> Contours:
+    """The outline of every image of `topic`; sd is the root mean square of all.
+
+    Raises `RecordingError` naming the first image without one and how many there are: none is left
+    out silently.
+    """
+    outlines, refused = [], []
+    for i, image in enumerate(frames.images):
+        try:
+            outlines.append(extract_outline(image, frames.m_per_px))
+        except RecordingError as error:
+            refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
+    if refused:
+        raise RecordingError(
+            f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
+        )
+    points, sd = tuple(o.points for o in outlines), rms([o.sd for o in outlines])
+    return Contours(frames.t, points, sd, frames.pose, frames.frame, topic)
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     p: Phantom = tree.settings
-    seen = placed(recording, tree, scene, p.positions, TOP_FACE, corners=(TOP_LEFT,))
+    seen = InclusionTest.place(recording, tree, scene, p.positions, TOP_FACE, corners=(TOP_LEFT,))
     return replace(seen, observations=tuple(map(p.sensors.of, seen.observations)))
 
 

@@ -24,7 +24,7 @@ from validate.solve.static.load_table import Tabulated
 from validate.solve.static.newton import StaticNewton
 from validate.solve.types import Scheme
 from validate.twin.sensors import signal, streams
-from validate.twin.ultrasound import Scanner, Target, b_mode
+from validate.twin.ultrasound import Scanner, Target
 
 from .sensors import OutlineSensor, Pen, StageProfile
 
@@ -151,7 +151,7 @@ def _b_mode(
     for load, ui in zip(PROFILE.loads, u, strict=True):
         outline = wall.section(ui, IMAGE_POSE)
         target = Target(outline, shadow=4.0, enhancement=3.0, texture=1.0, plate=size.size_x - load)
-        images.append(b_mode(SCANNER, target, rng))
+        images.append(SCANNER.b_mode(target, rng))
     pixel = SCANNER.m_per_px
     return Frames(t, tuple(images), (pixel, pixel), IMAGE_POSE, FRAME)
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from validate.arrays import Floats, Ints
 from validate.compare.exhibit import Entry, NumberTable
-from validate.datasets.home import data_path, named
+from validate.datasets.home import data_path, data_set_of
 from validate.errors import RecordingError, UsageError
 from validate.files import read_text
 from validate.recording.reader import source_of
@@ -60,7 +60,7 @@ def side_of(voxel: float | None, before: Path) -> float:
     if said:
         return float(said[1]) * _UNITS[said[2].lower()]
     mark = source_of(before, "").sha256
-    if any(mark == f.sha256 for f in named(FOLDER).files):
+    if any(mark == f.sha256 for f in data_set_of(FOLDER).files):
         return _KNOWN
     raise UsageError(
         f"{before.name} is in pixels of unknown size; measure it and pass --set voxel=0.4um"

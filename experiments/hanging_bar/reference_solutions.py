@@ -22,7 +22,6 @@ from validate.recording.reader import source_of
 from validate.recording.types import Recording, Signal
 from validate.register.observation import Deviation, Role, Selection, Simulated
 from validate.register.registration import Registered
-from validate.register.scene_registration import given_inputs
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
@@ -122,5 +121,6 @@ def sunk(run: Simulated) -> float:
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     drop = recording.signal("drop", _UNIT)
     return Registered(
-        (*given_inputs(scene, drop.t), Drop(float(drop.y[0, 0]), drop.sd, drop.t)), timed=False
+        (*Registered.given_inputs(scene, drop.t), Drop(float(drop.y[0, 0]), drop.sd, drop.t)),
+        timed=False,
     )

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.live import RecordedPath, live
+from validate.pipeline.live import RecordedPath
 from validate.pipeline.run.method_run import Cases, MethodRun
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
@@ -281,7 +281,7 @@ def _ticks_exhibit(tree: Tree, reference: MethodRun) -> Exhibit:
     path = RecordedPath(seen.t, seen.inputs + np.array(scene.tools[0].tip))
     rows: list[tuple[Entry, ...]] = []
     for name, loop in _LIVE.items():
-        done = live(replace(loop, **given).prepare(system), path, _LIVE_SECONDS)
+        done = path.live(replace(loop, **given).prepare(system), _LIVE_SECONDS)
         rows.append(_lived_row(name, TickTimes(done.late), TickTimes(done.work), given["dt"]))
     quantiles = tuple(f"{_PERCENT * q:g} %" for q in TickTimes.shares)
     table = NumberTable(
@@ -309,7 +309,7 @@ def _pace(scene: Scene, reference: MethodRun, dt: float) -> str:
     run = reference.run
     assert run.seconds is not None
     substeps = float(np.median(run.traces["updates"].y))
-    critical = critical_step(build_system(replace(scene, tools=()))).lanczos
+    critical = CriticalStep.of(build_system(replace(scene, tools=()))).lanczos
     seconds = float(np.median(run.seconds))
     times = RealTime(substeps / seconds, dt / substeps, critical)
     return (

@@ -20,8 +20,7 @@ from validate.fem.system import build as build_system
 from validate.parameters import quantity
 from validate.pipeline.experiment.experiment import Experiment, Progress
 from validate.pipeline.experiment.tree import Built, Tree
-from validate.pipeline.live import LIVE, as_given, recorded_tip
-from validate.pipeline.run.twin_record import made_here
+from validate.pipeline.live import RecordedPath, as_given
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
@@ -32,7 +31,7 @@ from validate.solve.haptic.loop import HapticLoop
 from validate.solve.haptic.rates import RealTime
 from validate.solve.march import march
 from validate.twin.sensors import LoadCell, signal, streams
-from validate.twin.tracker import START_NS
+from validate.twin.tracker import Origin
 
 from ..ekf_liver.body import of_its_body, watched
 from ..needle_pocket.hand import moved, tremor
@@ -161,7 +160,7 @@ def record(tree: Tree, progress: Progress) -> Recording:
         "hand": "minimum-jerk moves with tremor, synthetic",
     }  # fmt: skip
     return Recording(
-        "haptic_liver", Source("haptic_liver", "", 0, "made in memory"), START_NS,
+        "haptic_liver", Source("haptic_liver", "", 0, "made in memory"), Origin.start_ns,
         signals=signals, metadata={"provenance": provenance},
     )  # fmt: skip
 
@@ -191,7 +190,8 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
 
 def _walkable(recording: Recording) -> tuple[Floats, Floats, float, tuple[str, ...]]:
     """The path's seen samples: t (nt,) s, x (nt, 3) m, sd m; what was left out, in words."""
-    t, x, sd = recorded_tip(recording, 3)
+    path = RecordedPath.of(recording, 3)
+    t, x = path.t, path.x
     seen = np.isfinite(x).all(axis=1)
     if seen.sum() < 2:
         raise RecordingError(
@@ -208,7 +208,7 @@ def _walkable(recording: Recording) -> tuple[Floats, Floats, float, tuple[str, .
             f"the path's longest step is {steps.max():.3g} s, its median one "
             f"{np.median(steps):.3g} s: every sample is taken as one tick"
         )
-    return t[seen], x[seen], sd, tuple(findings)
+    return t[seen], x[seen], path.sd, tuple(findings)
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
@@ -223,10 +223,10 @@ def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:
 def follows(experiment: Experiment, recordings: Sequence[Recording], tree: Tree) -> Experiment:
     """The experiment as its recording has it: a live loop's own force, or a user's path."""
     recording, twin = recordings[0], experiment.twin
-    if made_here(recording) or twin is None:
+    if recording.made_with or twin is None:
         return experiment
-    if LIVE in recording.metadata:
-        return as_given(experiment, recording)
+    if given := as_given(experiment, recording):
+        return given
     there: tuple[Accept, ...] = tuple(
         a for a in experiment.accept if a.quantity in recording.signals
     )

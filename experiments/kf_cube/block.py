@@ -18,7 +18,6 @@ from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.register.sensing import PoseShift
 from validate.scene.material import Region
 from validate.scene.mesh import Mesh
@@ -77,7 +76,7 @@ class PulledBlock:
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
     own: PulledBlock = tree.settings
-    seen = follow_signal(recording, scene.mesh, "pull", "N", own.registration)
+    seen = Registered.following(recording, scene.mesh, "pull", "N", own.registration)
     pull, markers = seen.observations
     assert isinstance(markers, MarkerObservation)
     return replace(seen, observations=(pull, own.camera.of(markers)))

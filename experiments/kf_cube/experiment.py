@@ -16,7 +16,7 @@ from validate.estimate.kalman.modal_kf import ModalKf
 from validate.estimate.reduced.load_scale import LoadScale
 from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.pipeline.experiment.experiment import Case, Experiment, Twin
-from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.pipeline.experiment.method import Method
 from validate.scene.material import Region
 from validate.solve.dynamic.modal import Modal
 from validate.solve.dynamic.newmark import Newmark
@@ -54,13 +54,13 @@ METHODS = {
                       chosen=CHOSEN),
     "load_scale": Method("two states: amplitude and load scale", LoadScale(), markers=A),
     "kf_reduced": Method("20 modes and load bias, steady gain", ReducedKf(gains="steady"),
-                         markers=A, chosen=WALK_UNRECORDED),
+                         markers=A, chosen=Method.walk_unrecorded),
     "kf_gated": Method("20 modes and load bias, gate", ReducedKf(gate=0.999), markers=A,
-                       chosen=WALK_UNRECORDED),
+                       chosen=Method.walk_unrecorded),
     "kf_unclocked": Method("20 modes and load bias, time stamps taken as exact",
-                           ReducedKf(clock=0.0), markers=A, chosen=WALK_UNRECORDED),
+                           ReducedKf(clock=0.0), markers=A, chosen=Method.walk_unrecorded),
     "kf_smoothed": Method("20 modes and load bias", ReducedKf(smooth=True), markers=A,
-                          chosen=WALK_UNRECORDED),
+                          chosen=Method.walk_unrecorded),
     "roukf": Method("unscented filter of the stiffness, 2 runs", Roukf(), markers=A),
     "roukf_layer": Method("unscented filter of the stiffness of layer and rest, 3 runs",
                           Roukf(parameters=("stiffness.layer", "stiffness.body"), sd=(1.0, 0.25)),
@@ -70,7 +70,7 @@ METHODS = {
     "enkf": Method("ensemble filter of the stiffness, 10 runs, inflated by 1 %",
                    EnsembleKf(inflation=1.01), markers=A, chosen="inflation chosen on this twin"),
     "filterpy": Method("filterpy's KalmanFilter, 5 modes", FilterpyFilter(), markers=A,
-                       chosen=WALK_UNRECORDED),
+                       chosen=Method.walk_unrecorded),
 }  # fmt: skip
 RIVALS = ("fem", "kf_printed", "kf_load", "load_scale", "kf_reduced")
 CAREFUL = (*RIVALS, "kf_gated", "kf_unclocked", "kf_smoothed")

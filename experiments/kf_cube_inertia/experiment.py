@@ -10,7 +10,7 @@ from validate.estimate.ensemble.roukf import Roukf
 from validate.estimate.kalman.kf_fem import KfFem
 from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.pipeline.experiment.experiment import Case, Experiment, Twin, vary
-from validate.pipeline.experiment.method import WALK_UNRECORDED, Method
+from validate.pipeline.experiment.method import Method
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
@@ -46,7 +46,9 @@ METHODS = {
         KfFem(Q=PRINTED, R=PRINTED, P0=PRINTED, structure="load"),
         markers=A,
     ),
-    "kf_reduced": Method("20 modes and load bias", ReducedKf(), markers=A, chosen=WALK_UNRECORDED),
+    "kf_reduced": Method(
+        "20 modes and load bias", ReducedKf(), markers=A, chosen=Method.walk_unrecorded
+    ),
     "roukf_support": Method(
         "unscented filter of load and support, 3 runs",
         Roukf(parameters=("load.pull", "support.z0"), sd=(0.1, 0.3)),

@@ -15,7 +15,7 @@ from validate.arrays import Floats, rms
 from validate.pipeline.run.method_run import MethodRun
 from validate.register.observation import Selection
 from validate.register.registration import Registered
-from validate.scene.laws import LAWS, lost_stability
+from validate.scene.laws import LAWS
 from validate.scene.meshless import StretchMode
 from validate.solve.static.stretch_test import StretchTest
 
@@ -171,5 +171,5 @@ def _lost(p: Multimode, law: LawCard, seen: Sequence[Registered]) -> tuple[str, 
     ends = [principal(mode_of(s), s.inputs) for s in seen]
     low, high = min(e.min() for e in ends), max(e.max() for e in ends)
     c = replace(made.coefficients, stretches=(float(low), float(high)))
-    lost = lost_stability(made.law, c, made.shear_modulus)
+    lost = c.lost_stability(made.law, made.shear_modulus)
     return (lost.mode, lost.stretch) if lost else None

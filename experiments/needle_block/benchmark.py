@@ -21,7 +21,6 @@ from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.markers.fitting import MarkerFit
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.scene.scene import Drive, Scene
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
@@ -75,7 +74,7 @@ class Benchmark:
         for drive in scene.drives:
             _require_node(scene, drive)
         how = p.settings.registration
-        return follow_signal(recording, scene.mesh, self.input, self.unit, how)
+        return Registered.following(recording, scene.mesh, self.input, self.unit, how)
 
     def sets(self, p: Tree, seen: Registered) -> Mapping[str, Any]:
         return {"dt": p.settings.clock.dt}

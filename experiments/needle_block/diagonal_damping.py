@@ -13,6 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.compare.shapes.two_fields import FieldScores
 from validate.fem.critical import Modes
 from validate.fem.system import System, build
 from validate.scene.scene import Scene
@@ -21,7 +22,7 @@ from validate.solve.march import march
 from validate.solve.types import Run
 
 from .benchmark import IMPLICIT
-from .errors import INSTANTS, Errors, errors_of, instants_table, units_in
+from .errors import INSTANTS, Errors, errors_of, instants_table
 
 FULL, PAPERS, MATCHED, DIAGONAL = "αM + βK", "αM", "α'M, first mode's damping", "diagonal of C"
 _TABLED = (0, 1, 2, 5, 10, 20, 50)  # of the modes, as far as there are
@@ -40,7 +41,7 @@ def damping_exhibit(
     numbers = {"damping.papers": two[PAPERS], "damping.matched": two[MATCHED]}
     table = instants_table(
         "diagonal_damping", "Implicit, consistent mass, C diagonal, against the full C.",
-        errors, _METRICS, units_in(scene.mesh.dimension),
+        errors, _METRICS, FieldScores.units(scene.mesh.dimension),
     )  # fmt: skip
     chart = Chart(
         "damping_ratios", "Damping of the modes by the form of C", "frequency / (1/s)",

@@ -12,8 +12,8 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NodeMap, NumberTable, Series
-from validate.compare.shapes.pair import Common, Field, pair
-from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compared
+from validate.compare.shapes.pair import Field
+from validate.compare.shapes.two_fields import FieldScores
 from validate.fem.assembly.locate import Rows
 from validate.fem.system import System
 from validate.pipeline.experiment.method import Method
@@ -29,7 +29,6 @@ RIVALS = ("explicit", "implicit_lumped", "explicit_lumped", "quasi_static")
 DRAWN = ("E_n", "E_s", "E_i")
 TABLED = ("E_n", "L2.relative", "energy.relative", "E_s", "E_i", "E_i.mean")
 _EVERY = 5  # steps between two compared frames: 1/6 s shows every swing of both benchmarks
-_METRICS = {m.name: m for m in METRICS_OF_FIELDS}
 
 
 @dataclass(frozen=True)
@@ -77,17 +76,15 @@ def errors_of(
     rows = (
         None if np.array_equal(mesh.nodes, on.mesh.nodes) else Rows.barycentric(mesh, on.mesh.nodes)
     )
-    common = Common(on.mesh, on)
+    onto: Scene | FieldScores = on
     chosen = frames_of(one.t, one.at.tolist()) if frames is None else list(frames)
     t = one.t[one.at[chosen]]
     values = {name: np.full(len(chosen), np.nan) for name in names}
     refused = []
     for i, k in enumerate(chosen):
         u = one.u[k] if rows is None else rows.apply(one.u[k])
-        between = pair(
-            Field(on.mesh, u, label or one.method), Field(on.mesh, truth[k], "truth"), common
-        )
-        found = compared(between, tuple(_METRICS[name] for name in names))
+        run, exact = Field(on.mesh, u, label or one.method), Field(on.mesh, truth[k], "truth")
+        onto = found = FieldScores.of(run, exact, onto, names)
         for score in found.scores:
             values[score.name][i] = score.value
         refused += [(float(t[i]), name, why) for name, why in found.refused]
@@ -96,8 +93,8 @@ def errors_of(
 
 def l2_error(mesh: Mesh, u: Floats, on: Scene, truth: Floats) -> float:
     """Relative L2 norm of u (n, d) m on a mesh against `truth` (no, d) m on the mesh of `on`."""
-    between = pair(Field(mesh, u, "field"), Field(on.mesh, truth, "truth"), on)
-    (score,) = compared(between, (_METRICS["L2.relative"],)).scores
+    run, exact = Field(mesh, u, "field"), Field(on.mesh, truth, "truth")
+    (score,) = FieldScores.of(run, exact, on, ("L2.relative",)).scores
     return score.value
 
 
@@ -140,14 +137,10 @@ def _gaps(errors: Mapping[str, Errors]) -> str:
     return f"Without a value: {'; '.join(sorted(reasons))}." if reasons else ""
 
 
-def units_in(dimension: int) -> dict[str, str]:
-    return {name: m.unit.format(dimension=dimension) for name, m in _METRICS.items()}
-
-
 def errors_exhibit(errors: Mapping[str, Errors], dimension: int, figures: Mapping[str, str],
                    words: tuple[str, ...]) -> Exhibit:  # fmt: skip
     """E_n, E_s and E_i over time, and every norm at the instants; `figures` are the captions."""
-    units = units_in(dimension)
+    units = FieldScores.units(dimension)
     charts = tuple(
         Chart(
             f"{name}_over_time", f"{name} against the implicit run", "time / s",
@@ -214,7 +207,7 @@ def switches_exhibit(case: Mapping[str, MethodRun], dimension: int) -> tuple[Exh
     table = instants_table(
         "switches",
         "Lumped masses and the restriction of C to alpha M, one at a time. The paper's 'mass "
-        "lumping' is both.", errors, ("E_n", "E_i"), units_in(dimension),
+        "lumping' is both.", errors, ("E_n", "E_i"), FieldScores.units(dimension),
     )  # fmt: skip
     lumped = errors["implicit_lumped_full"].at("E_i", 2.0) or 0.0
     restricted = errors["implicit_restricted"].at("E_i", 2.0) or 0.0

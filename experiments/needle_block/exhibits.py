@@ -8,6 +8,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
+from validate.compare.shapes.two_fields import FieldScores
 from validate.fem.assembly.volume_constraints import mixed_static
 from validate.fem.system import System
 from validate.fem.system import build as build_system
@@ -48,7 +49,6 @@ from .errors import (
     static_exhibit,
     sum_ratio,
     switches_exhibit,
-    units_in,
 )
 from .further_exhibits import BLOCK, beyond
 from .integration_rules import rules_exhibit
@@ -185,7 +185,7 @@ def _materials(p: Tree, cases: Cases) -> tuple[Exhibit, dict[str, float]]:
     )  # fmt: skip
     table = instants_table(
         "materials", "The solutions with MP1, and quasi-static MP2, against implicit MP2.", found,
-        ("E_n", "E_s", "E_i"), units_in(2),
+        ("E_n", "E_s", "E_i"), FieldScores.units(2),
     )  # fmt: skip
     wrong = errors["implicit"].at("E_s", 10.0) or 0.0
     share = (own.at("E_s", 10.0) or 0.0) / (wrong or 1.0)
@@ -329,7 +329,7 @@ def _meshes(cases: Cases, errors: Mapping[str, Errors]) -> tuple[Exhibit, dict[s
     finer = errors_on(case, ("E_n", "E_i"), ("implicit", *RIVALS), frames)
     own = instants_table(
         "mesh_error", "Against the implicit run on a mesh of twice as many cells a side: E_n, E_i.",
-        finer, ("E_n", "E_i"), units_in(2),
+        finer, ("E_n", "E_i"), FieldScores.units(2),
     )  # fmt: skip
     locked = {name: _locking(20, m) for name, m in MATERIALS.items()}
     words = (

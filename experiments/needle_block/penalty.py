@@ -16,13 +16,14 @@ from scipy.sparse.linalg import splu
 from validate.arrays import Floats
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
 from validate.fem.assembly.assemble import stiffness_points
-from validate.fem.assembly.volume_constraints import mixed_static, volume_penalty
-from validate.fem.critical import lanczos_step
+from validate.fem.assembly.volume_constraints import mixed_static
+from validate.fem.critical import CriticalStep
 from validate.fem.system import System, build
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
 from .errors import l2_error
+from .volume_penalty import volume_penalty
 
 WEIGHTS = (1.0, 10.0, 100.0, 1e3, 1e4)  # of the penalty, over the shear modulus
 LOWER = 0.3  # the "lower Poisson ratio" of the penalised body
@@ -155,7 +156,9 @@ def motion(K: sparse.csc_array, masses: Floats) -> tuple[float, float]:
     where a pair that is not real grows by the imaginary part of w.
     """
     if abs(K - K.T).max() <= 1e-12 * abs(K).max():
-        return lanczos_step(lambda x: K @ x, masses, products=min(80, len(masses))).limit, 0.0
+        return CriticalStep.by_lanczos(
+            lambda x: K @ x, masses, products=min(80, len(masses))
+        ).limit, 0.0
     w = np.sqrt(eigvals(K.toarray() / masses[:, None]).astype(complex))
     return 2 / float(np.abs(w).max()), float(np.abs(w.imag).max())
 

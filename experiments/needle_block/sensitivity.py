@@ -13,6 +13,7 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
+from validate.compare.shapes.two_fields import FieldScores
 from validate.fem.system import build
 from validate.scene.geometries.box import grid
 from validate.scene.mesh import Mesh
@@ -22,7 +23,7 @@ from validate.solve.types import Run
 
 from .benchmark import FIVE
 from .body import STEP
-from .errors import DRAWN, errors_of, units_in
+from .errors import DRAWN, errors_of
 
 AT = (1.0, 2.0, 5.0)  # s; a metric is the mean over these
 SHIFT = 0.2  # of a cell: how far inner nodes are moved at most, along each axis
@@ -178,7 +179,7 @@ def _costs(bench: TurnedBench, off: Mapping[str, Means], beside: Mapping[str, Me
         rows.append((f"{t.name} / {t.unit}", t.nominal, p, *(means[m] for m in DRAWN), *per))
     for name, means in (*beside.items(), *((FIVE[n].label, m) for n, m in solvers.items())):
         rows.append((name, None, None, *(means[m] for m in DRAWN), None, None, None))
-    units = units_in(bench.scene.mesh.dimension)
+    units = FieldScores.units(bench.scene.mesh.dimension)
     heads = (
         "what differs", "nominal", "changed to", *(f"{m} / {units[m]}" for m in DRAWN),
         *(f"{m} per ln p / {units[m]}" for m in DRAWN),

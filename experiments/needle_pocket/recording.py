@@ -11,8 +11,7 @@ from validate.compare.verdict import Accept
 from validate.errors import RecordingError
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.tree import Tree
-from validate.pipeline.live import LIVE, as_given, recorded_tip
-from validate.pipeline.run.twin_record import made_here
+from validate.pipeline.live import RecordedPath, as_given
 from validate.recording.types import Recording
 from validate.scene.mesh import Mesh
 
@@ -23,12 +22,12 @@ def follows(experiment: Experiment, recordings: Sequence[Recording], p: Tree) ->
     """The experiment as its recording has it: a path of the user's own is walked as it is."""
     recording = recordings[0]
     accept = tuple(_of_space(a, p) for a in experiment.accept)
-    if made_here(recording):
+    if recording.made_with:
         return replace(experiment, accept=accept)
     twin = experiment.twin
     assert twin is not None
-    if LIVE in recording.metadata:
-        return as_given(experiment, recording)
+    if given := as_given(experiment, recording):
+        return given
     there = tuple(a for a in accept if a.quantity in recording.signals)
     return replace(experiment, accept=there, twin=replace(twin, remake=()))
 
@@ -60,7 +59,8 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
     walked.
     """
     space = "plane" if mesh.dimension == 3 else "solid"
-    t, x, sd = recorded_tip(recording, mesh.dimension, f"--set body.space={space}")
+    path = RecordedPath.of(recording, mesh.dimension, f"--set body.space={space}")
+    t, x = path.t, path.x
     low, high = mesh.nodes.min(axis=0), mesh.nodes.max(axis=0)
     size = float((high - low).max())
     seen = np.asarray(np.isfinite(x).all(axis=1))
@@ -88,7 +88,7 @@ def walkable(recording: Recording, mesh: Mesh) -> Walkable:
         _said(deep, f"is deeper than {100 * _LINEAR:g} % of the body's height: beyond linearity"),
         _left(x[kept], low, high),
     ]
-    return Walkable(t[kept], x[kept], sd, tuple(f for f in findings if f))
+    return Walkable(t[kept], x[kept], path.sd, tuple(f for f in findings if f))
 
 
 def _beyond(x: Floats, low: Floats, high: Floats) -> Floats:

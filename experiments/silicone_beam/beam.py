@@ -24,7 +24,6 @@ from validate.recording.types import Markers, Recording
 from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Deviation, Selection, Simulated
 from validate.register.registration import Registered
-from validate.register.scene_registration import given_inputs
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
@@ -90,7 +89,7 @@ def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
         Selection(SETTLED, np.array([end]), "means over a second of rest"),
         Selection(LABEL, seen.t[seen.compared], "every sample of the swing"),
     )
-    return Registered((*given_inputs(scene, t), Resting(**vars(tips)), seen), selections)
+    return Registered((*Registered.given_inputs(scene, t), Resting(**vars(tips)), seen), selections)
 
 
 def _swing(whole: MarkerObservation, moving: Markers, p: ReleasedBeam, until: float) -> Swing:
@@ -135,7 +134,7 @@ def _tracked(
         positions=Rows.standing(scene.mesh, rest), sd=_noise(_moved(whole, moving)), axis_sd=(),
         tre=np.full(len(TIPS), np.sqrt(3) * p.ranges.repeats),
     )  # fmt: skip
-    inputs = given_inputs(scene, tips.t)
+    inputs = Registered.given_inputs(scene, tips.t)
     return Registered((*inputs, tips), (Selection("tracked", tips.t, "every sample"),))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from validate.arrays import Floats, rms
 from validate.compare.exhibit import Chart, Entry, Exhibit, NumberTable, Series
-from validate.identify.recorded_motion import Ringing, spectrum
+from validate.identify.recorded_motion import Ringing
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.run.method_run import MAIN, Cases, MethodRun
 
@@ -116,7 +116,7 @@ def _spectra(swing: Swing, runs: Mapping[str, MethodRun]) -> Chart:
     for label, u in moved.items():
         z, t = u[late][..., 2].mean(axis=1), swing.t[swing.compared][late]
         seen = np.isfinite(z)
-        f, amplitude = spectrum(t[seen], z[seen])
+        f, amplitude = Ringing.spectrum(t[seen], z[seen])
         series.append(Series(label, f[f <= _TO], _MM * amplitude[f <= _TO]))
     return Chart(
         "spectrum", "Spectrum of the mean vertical motion", "frequency / Hz", "amplitude / mm",

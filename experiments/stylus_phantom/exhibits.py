@@ -22,9 +22,9 @@ from validate.pipeline.run.method_run import MAIN, Cases
 from validate.recording.types import Recording
 from validate.register.markers.transform import Similarity
 from validate.register.tools.landmarks import Digitised
-from validate.report.scenes.points import points_picture
 
 from .phantom import PUBLISHED, SEQUENCE, StylusPhantom, digitised, shaft_of
+from .picture import points_picture
 from .plus import by_plus
 from .touched_landmarks import TouchedLandmarks
 

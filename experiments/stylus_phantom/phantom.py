@@ -21,12 +21,7 @@ from validate.recording.readers import recognised
 from validate.recording.types import Recording
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
-from validate.register.tools.landmarks import (
-    Digitised,
-    dwells,
-    match_landmarks,
-    sd_of_mean,
-)
+from validate.register.tools.landmarks import Digitised, Dwell
 from validate.scene.meshless import RigidBody
 
 from .touched_landmarks import TouchedLandmarks, tip_path
@@ -193,7 +188,7 @@ def digitised(
     """The touched landmarks; `part` of a dwell in place of the parameters' own."""
     t, x = path_of(recording, p, np.zeros(3))
     rule = p.dwell
-    standing = dwells(t, x, rule.radius, rule.least)
+    standing = Dwell.of_path(t, x, rule.radius, rule.least)
     if not standing:
         raise RecordingError(
             f"{recording.name}: the tip never rests within {1e3 * rule.radius:g} mm for "
@@ -202,14 +197,8 @@ def digitised(
     whole = (part or rule.part) == "whole"
     parts = standing if whole else tuple(d.touch(rule.touch, rule.holds) for d in standing)
     names, places = known(recording)
-    match = match_landmarks(places, np.array([d.centre for d in parts]), rule.match)
-    if p.tip.off.any():
-        _, x = path_of(recording, p, p.tip.off)
-        parts, standing = (
-            tuple(replace(d, x=x[d.begin : d.end]) for d in group) for group in (parts, standing)
-        )
-    counted = [tuple(group[i] for i in match.seen) for group in (parts, standing)]
-    return Digitised(t, x, standing, parts, names, places, match, sd_of_mean(*counted))
+    found = Digitised.of(t, x, standing, parts, names, places, rule.match)
+    return found.along(path_of(recording, p, p.tip.off)[1]) if p.tip.off.any() else found
 
 
 def path_of(recording: Recording, p: StylusPhantom, beyond: Floats) -> tuple[Floats, Floats]:

@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
+from validate.arrays import Floats
 from validate.compare.exhibit import (
     Chart,
     Entry,
@@ -25,10 +27,8 @@ from validate.pipeline.experiment.experiment import (
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import MAIN, Cases
-from validate.recording.images.image import ellipse_through
 from validate.recording.types import Recording
 from validate.report.scenes.outline_images import outlines_over
-from validate.report.sections.observations import Held
 
 from .disk import FILE, FOUND, OUTLINES, ImagedDisk, outlined
 from .round_outlines import RoundOutlines
@@ -97,20 +97,19 @@ def _images(seen: RoundOutlines) -> tuple[ImageSeries, Picture]:
     even = np.linspace(0, len(seen.t) - 1, min(_SHOWN - 2, len(seen.t))).round().astype(int)
     ends = (int(seen.diameters.argmin()), int(seen.diameters.argmax()))
     at = sorted({*even.tolist(), *ends})
-    holds = tuple(Held(f"{_MM * seen.diameters[i]:.2f} mm", 0.0, "1", float(seen.t[i])) for i in at)
+    instants = [(f"{_MM * seen.diameters[i]:.2f} mm", float(seen.t[i])) for i in at]
     words = "Those of the least and of the largest diameter are among them."
-    return outlines_over(seen.frames, seen.contours, holds, "of the disk", words)
+    return outlines_over(seen.frames, seen.contours, instants, "of the disk", words)
 
 
 def _table(seen: RoundOutlines) -> NumberTable:
     rows: list[tuple[Entry | TableCell, ...]] = []
     for i, (outline, circle) in enumerate(zip(seen.outlines, seen.circles, strict=True)):
-        _, half, _ = ellipse_through(outline)
         off = np.linalg.norm(outline - circle.centre, axis=1) - circle.radius
         wide, tall = np.ptp(outline, axis=0)
         rows.append((
             i, *(_hundredths(_MM * v) for v in (2 * circle.radius, *circle.centre, wide, tall)),
-            _MM * circle.rms, _MM * float(np.ptp(off)), float(half.max() / half.min()),
+            _MM * circle.rms, _MM * float(np.ptp(off)), _axes(outline),
         ))  # fmt: skip
     return NumberTable(
         "diameters",
@@ -122,6 +121,13 @@ def _table(seen: RoundOutlines) -> NumberTable:
         tuple(rows),
         folded=len(rows) > 40,
     )  # fmt: skip
+
+
+def _axes(outline: Floats) -> float:
+    """Long over short axis of the least-squares ellipse through an outline (k, 2) m."""
+    off = outline - outline.mean(axis=0)
+    _, axes, _ = cv2.fitEllipseDirect((off / np.abs(off).max()).astype(np.float32))
+    return float(max(axes) / min(axes))
 
 
 def _hundredths(value: float) -> TableCell:

@@ -7,7 +7,7 @@ from field_oracles import weighted_nodal_sum
 from validate.arrays import Floats
 from validate.compare.shapes.pair import Field, FieldPair, pair
 from validate.compare.shapes.two_fields import (
-    compare_fields,
+    FieldScores,
     mean_distance,
     relative_energy_norm,
     relative_l2_norm,
@@ -30,7 +30,7 @@ def test_one_triangle_by_hand() -> None:
     mesh = Mesh(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([[0, 1, 2]]), "tri3")
     u = np.tile([1.0, 0.0], (3, 1))
     run = Field(mesh, u + np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]), "run")
-    found = {s.name: s.value for s in compare_fields(run, Field(mesh, u, "ref"))}
+    found = {s.name: s.value for s in FieldScores.of(run, Field(mesh, u, "ref")).whole()}
     lam, mu = 1e4 * 0.3 / (1.3 * 0.4), 1e4 / 2.6
     exact = {
         "E_n": 1 / np.sqrt(3),
@@ -45,7 +45,8 @@ def test_one_triangle_by_hand() -> None:
     assert {name: found[name] for name in exact} == pytest.approx(exact, rel=1e-13)
     between = pair(run, Field(mesh, 2 * u, "ref"), Scene(mesh, SOFT))
     bent = {
-        s.name: s.value for s in compare_fields(run, Field(mesh, run.u / 2, "r"), between.common)
+        s.name: s.value
+        for s in FieldScores.of(run, Field(mesh, run.u / 2, "r"), between.common).whole()
     }
     assert bent["energy"] == pytest.approx(np.sqrt((lam + 2 * mu) / 2) / 2, rel=1e-12)
     assert bent["energy.relative"] == pytest.approx(1.0, rel=1e-12)

@@ -30,7 +30,7 @@ from validate.compare.shapes.shape_error import (
     surface_error,
     symmetric_difference,
 )
-from validate.compare.shapes.two_fields import compare_fields, compared
+from validate.compare.shapes.two_fields import FieldScores, compared
 from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
 from validate.scene.mesh import Mesh
@@ -253,7 +253,7 @@ def test_bodies_on_different_meshes_keep_their_own_boundary() -> None:
     area = lambda n: 3 * n * np.sin(np.pi / 2 / n) / 2  # noqa: E731
     # Chords inside both arcs: outer slivers are lost, inner slivers gained.
     between = (4 + 1) / 2 * (64 * np.sin(np.pi / 128) - 4 * np.sin(np.pi / 8))
-    found = {s.name: s.value for s in compare_fields(one, other)}
+    found = {s.name: s.value for s in FieldScores.of(one, other).whole()}
     assert found["E_s"] == pytest.approx(between / area(64), rel=1e-10)
 
 

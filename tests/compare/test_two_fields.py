@@ -12,7 +12,7 @@ from validate.compare.force_error import FORCE_METRICS
 from validate.compare.score import Metric
 from validate.compare.shapes.pair import Common, Field, FieldPair, pair
 from validate.compare.shapes.shape_error import BOUNDARY_METRICS
-from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, compare_fields, compared
+from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, FieldScores, compared
 from validate.errors import ComparisonError
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
@@ -54,7 +54,7 @@ def on(mesh: Mesh, factor: float = 1.0) -> tuple[Field, Field, Scene]:
 
 
 def values(run: Field, reference: Field, onto: Scene) -> dict[str, float]:
-    return {s.name: s.value for s in compare_fields(run, reference, onto)}
+    return {s.name: s.value for s in FieldScores.of(run, reference, onto).whole()}
 
 
 def test_identical_fields_are_exactly_zero_in_every_metric(mesh: Mesh) -> None:
@@ -125,15 +125,15 @@ def test_a_rigid_shift_is_what_it_is(mesh: Mesh, shift: float) -> None:
 def test_relative_norms_at_rest_are_refused_with_the_reason(mesh: Mesh) -> None:
     rest = Field(mesh, np.zeros(mesh.nodes.shape), "reference")
     with pytest.raises(ComparisonError, match=r"2 metrics.*E_n: E_n is 0/0: reference"):
-        compare_fields(rest, rest)
+        FieldScores.of(rest, rest).whole()
 
 
 def test_without_a_scene_there_are_no_energy_norms(mesh: Mesh) -> None:
     run, reference, _ = on(mesh)
-    names = {s.name for s in compare_fields(run, reference)}
+    names = {s.name for s in FieldScores.of(run, reference).whole()}
     assert {m.name for m in METRICS_OF_FIELDS} - names == {"energy", "energy.relative"}
     with pytest.raises(ComparisonError, match="needs moduli"):
-        compare_fields(run, reference, metrics=METRICS_OF_FIELDS)
+        FieldScores.of(run, reference, metrics=METRICS_OF_FIELDS).whole()
 
 
 @pytest.mark.parametrize("kinds", [("tri3", "quad4"), ("tri6", "tri3"), ("hex8", "tet10")])
@@ -144,7 +144,7 @@ def test_a_linear_field_is_the_same_on_any_mesh(kinds: tuple[str, str]) -> None:
     fields = [Field(m, m.nodes @ gradient, k) for m, k in zip((one, other), kinds, strict=True)]
     finer = (box((1.0, 0.8), (7, 5)) if one.dimension == 2 else box((1.0, 0.8, 0.6), (4, 3, 3)),)
     for onto in (None, one, *finer):
-        found = {s.name: s for s in compare_fields(*fields, onto)}
+        found = {s.name: s for s in FieldScores.of(*fields, onto).whole()}
         assert all(abs(s.value) < 1e-13 for s in found.values()), found
     assert found["outside"].count == 2 * len(finer[0].nodes)
     assert f"0 of {found['outside'].count} carried nodes outside" in found["E_n"].definition
@@ -155,7 +155,7 @@ def test_nodes_outside_are_counted_and_measured() -> None:
     short, long = grid((1.0, 1.0), (4, 4)), grid((1.1, 1.0), (11, 4))
     run = Field(short, 0.1 + 0 * short.nodes, "run")
     reference = Field(long, 0.1 + 0 * long.nodes, "reference")
-    found = {s.name: s for s in compare_fields(run, reference)}
+    found = {s.name: s for s in FieldScores.of(run, reference).whole()}
     assert (found["outside"].value, found["outside"].count) == (5, 60)
     assert found["outside.max"].value == pytest.approx(0.1, rel=1e-12)
     assert found["E_n"].value == pytest.approx(0, abs=1e-14)
@@ -167,9 +167,9 @@ def test_another_frame_and_another_dimension_are_refused() -> None:
     far = replace(far, nodes=far.nodes + 5.0)
     still = [Field(m, np.ones(m.nodes.shape), "run") for m in (near, far, MESHES["tet4"])]
     with pytest.raises(ComparisonError, match="9 of 9 nodes lie outside"):
-        compare_fields(still[0], still[1])
+        FieldScores.of(still[0], still[1]).whole()
     with pytest.raises(ComparisonError, match="run is 2-D, run 3-D"):
-        compare_fields(still[0], still[2])
+        FieldScores.of(still[0], still[2]).whole()
     with pytest.raises(ComparisonError, match=r"shape \(9, 3\)"):
         Field(near, np.zeros((9, 3)), "run")
 

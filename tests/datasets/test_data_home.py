@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from validate.datasets import home
-from validate.datasets.home import DataFile, DataSet, data_path, data_sets, named, whole
+from validate.datasets.home import DataFile, DataSet, data_path, data_set_of, data_sets, whole
 from validate.errors import RecordingError, UsageError
 
 FOLDER, FILE = "markers/silicone-beam", "beam_gravity_V2_b.c3d"
@@ -46,14 +46,14 @@ def test_a_set_has_all_that_is_needed_to_bring_and_to_cite_it() -> None:
         assert theirs.brought or theirs.made, theirs.name
         assert all(f.source for f in theirs.files) or theirs.made, theirs.name
     assert len({s.name for s in data_sets()}) == len(data_sets())
-    beam = named("silicone_beam")
-    assert beam is named("markers/silicone-beam/")
+    beam = data_set_of("silicone_beam")
+    assert beam is data_set_of("markers/silicone-beam/")
     assert beam.address(next(f for f in beam.files if f.name == FILE)) == (
         f"https://raw.githubusercontent.com/srl-ethz/diffPD_sim2real/{beam.commit}"
         f"/python/realbeam_experiments/Measurement_data/{FILE}"
     )
     with pytest.raises(UsageError, match=r"'silicon-bean'; nearest: silicone-beam"):
-        named("silicon-bean")
+        data_set_of("silicon-bean")
 
 
 def test_what_is_absent_names_the_command(tmp_path: Path) -> None:

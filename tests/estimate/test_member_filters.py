@@ -30,7 +30,7 @@ from validate.estimate.kalman.formulas import (
 )
 from validate.estimate.measurements import Measurements
 from validate.fem.assembly.assemble import stiffness
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import System, build
 from validate.scene.geometries.box import box, centroids
 from validate.scene.material import Region
@@ -459,7 +459,7 @@ def test_the_stiffest_member_must_bear_the_step() -> None:
     """Its critical step is the model's over the root of its stiffness: refused just beyond, before
     step 1, with what would do."""
     system, h = explicit_cube(), 4e-4
-    exact = 2 * np.log(0.95 * critical_step(system).lanczos / h)
+    exact = 2 * np.log(0.95 * CriticalStep.of(system).lanczos / h)
     inputs = ramp(h, 4, 1.0, 0.01)
 
     def found(**settings: Any) -> Outcome:

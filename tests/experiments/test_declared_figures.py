@@ -7,7 +7,7 @@ from beside import beside
 from validate.compare.published import Figure
 from validate.pipeline import load
 from validate.pipeline.experiment.experiment import Experiment
-from validate.pipeline.experiment.method import WALK_UNRECORDED
+from validate.pipeline.experiment.method import Method
 
 DECLARED = {
     "async_block": 3,
@@ -135,7 +135,7 @@ def test_a_load_walk_of_unknown_origin_is_marked(name: str) -> None:
     """Whether it was tuned on the twin that judges it is not known, so the verdict says that."""
     walking = {n: m for n, m in load(name).methods.items() if hasattr(m.settings, "load_walk")}
     assert walking
-    assert [n for n, m in walking.items() if WALK_UNRECORDED not in m.chosen] == []
+    assert [n for n, m in walking.items() if Method.walk_unrecorded not in m.chosen] == []
 
 
 def test_tetrahedra_at_a_rate_that_no_mesh_has_are_no_fault() -> None:

@@ -14,7 +14,7 @@ from validate.parameters import with_values
 from validate.pipeline.experiment.experiment import Identified
 from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.origins import opened
-from validate.recording.clocks.alignment import Offset, shift
+from validate.recording.clocks.alignment import Offset
 from validate.recording.types import Recording, Signal, Source
 from validate.register.signals import SignalObservation
 
@@ -65,7 +65,7 @@ def test_a_moved_force_clock_moves_what_is_compared() -> None:
     """2 s too late at rates of 0.1 s: 20 samples; and the clock's uncertainty is kept."""
     plain, offset = pressed(), Offset(2.0, 0.05, "given by the user", 200, 1.0)
     scene = model_scene(SMALL, SHIPPED.methods["slip"], E=E)
-    moved = shift(plain, "force", offset)
+    moved = offset.shift(plain, "force")
     (before,), (after,) = (place(r, SMALL, scene).of(SignalObservation) for r in (plain, moved))
     assert after.y[:50, 0] - after.y[0, 0] == pytest.approx(before.y[:50, 0] - before.y[0, 0])
     assert (before.sd_t, after.sd_t) == (0.0, 0.05)

@@ -13,7 +13,7 @@ from beside import experiment
 from experiments.ekf_cube.published import CUBE_FIGURES
 from experiments.ekf_cube.tables import readings_table
 from validate.compare.result import MethodResult, Result
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import folder_of
@@ -71,7 +71,7 @@ def test_the_mesh_is_near_the_printed_counts_and_its_step_is_known(scene: Scene)
     """839 nodes and 3760 cells are printed, within 1 %."""
     assert len(scene.mesh.nodes) == pytest.approx(839, abs=9)
     assert len(scene.mesh.cells) == pytest.approx(3760, abs=38)
-    assert critical_step(build_system(scene)).lanczos == pytest.approx(STEP, rel=2e-3)
+    assert CriticalStep.of(build_system(scene)).lanczos == pytest.approx(STEP, rel=2e-3)
 
 
 def test_the_printed_step_is_refused_with_its_ratio(printed: Result) -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from experiments.ekf_cube.rates import Integrator, Rate, cells_at, measured_rates, rates_exhibit
 from validate.estimate.extended.node_ekf import NodeEKF
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
@@ -54,7 +54,7 @@ def test_every_integrator_is_measured_on_the_meshes_it_may_be() -> None:
     ]  # fmt: skip
     for n in (1, 2):
         scene = Scene(box((0.1,) * 3, (n,) * 3), SOFT, (Support("z0", (0, 1, 2)),))
-        limit = critical_step(build(scene)).lanczos
+        limit = CriticalStep.of(build(scene)).lanczos
         for r in (r for r in rates if r.cells == 6 * n**3):
             assert r.times.critical_dt == pytest.approx(limit, rel=1e-3)
             assert r.times.rate_hz > 0

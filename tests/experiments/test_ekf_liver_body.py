@@ -16,7 +16,7 @@ from experiments.ekf_liver.body import (
 from experiments.ekf_liver.ladder import LIVER_LADDER
 from validate.datasets.home import SHARED
 from validate.errors import RecordingError, SceneError
-from validate.fem.critical import cell_altitudes, critical_step
+from validate.fem.critical import CriticalStep, cell_altitudes
 from validate.fem.system import build
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
@@ -116,7 +116,7 @@ def test_the_printed_step_is_below_the_critical_one_of_both_bodies(mesh: Mesh) -
     """Ours .117 ms and the data folder's .109 ms; there eq 16 by the altitude of one sliver allows
     a third of that."""
     scene = scene_of(mesh)
-    found = critical_step(build(scene))
+    found = CriticalStep.of(build(scene))
     generated = len(mesh.cells) == 4914
     assert found.lanczos == pytest.approx(0.11685e-3 if generated else 0.10939e-3, rel=2e-3)
     assert 0.95 * found.lanczos > 1e-4

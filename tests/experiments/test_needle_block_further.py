@@ -36,7 +36,7 @@ from experiments.needle_block.sensitivity import (
     slope,
     solve,
 )
-from validate.fem.critical import Modes, lanczos_step
+from validate.fem.critical import CriticalStep, Modes
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 
@@ -102,7 +102,7 @@ def test_steps_of_a_matrix_that_is_not_symmetric() -> None:
     K, masses = system.K[system.free][:, system.free], system.masses[system.free]
     found, growth = motion(csc_array(K), masses)
     assert growth == 0
-    assert found == pytest.approx(lanczos_step(lambda x: K @ x, masses).limit, rel=1e-6)
+    assert found == pytest.approx(CriticalStep.by_lanczos(lambda x: K @ x, masses).limit, rel=1e-6)
 
 
 @pytest.mark.parametrize("cells", [grid, box])

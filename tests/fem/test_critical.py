@@ -11,11 +11,7 @@ from field_oracles import frequency_range
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem import critical as module
-from validate.fem.critical import (
-    critical_step,
-    element_frequencies,
-    lanczos_step,
-)
+from validate.fem.critical import CriticalStep, element_frequencies
 from validate.fem.large_strain import explicit
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.system import System, build
@@ -45,10 +41,10 @@ def exact_limit(system: System) -> float:
 @pytest.mark.parametrize("order", [1, 2])
 def test_lanczos_finds_the_largest_frequency(order: int) -> None:
     system = block(4 - order, order)
-    found, exact = critical_step(system, margin=0.0), exact_limit(system)
+    found, exact = CriticalStep.of(system, margin=0.0), exact_limit(system)
     assert found.lanczos == pytest.approx(exact, rel=1e-4)
     assert 0.98 * exact < found.recommended <= exact
-    withdrawn = critical_step(system, margin=0.1).recommended
+    withdrawn = CriticalStep.of(system, margin=0.1).recommended
     assert withdrawn == pytest.approx(0.9 * found.recommended, rel=1e-12)
     assert found.gershgorin < exact
     if order == 1:
@@ -60,18 +56,18 @@ def test_few_products_leave_a_gap_that_the_safe_step_takes_off() -> None:
     """Lanczos comes from below in omega: its step alone would be too large."""
     rng = np.random.default_rng(1)
     d = np.sort(rng.uniform(0.0, 1.0, 4000)) ** 0.1
-    found = lanczos_step(lambda x: d * x, np.ones(4000), products=15, margin=0.0)
+    found = CriticalStep.by_lanczos(lambda x: d * x, np.ones(4000), products=15, margin=0.0)
     exact = 2 / np.sqrt(d[-1])
     assert found.products == 15
     assert found.safe < exact < found.limit
     with pytest.raises(SceneError, match="at least 15 products"):
-        lanczos_step(lambda x: d * x, np.ones(4000), products=10)
+        CriticalStep.by_lanczos(lambda x: d * x, np.ones(4000), products=10)
     with pytest.raises(SceneError, match=r"margin 0\.7"):
-        lanczos_step(lambda x: d * x, np.ones(4000), margin=0.7)
+        CriticalStep.by_lanczos(lambda x: d * x, np.ones(4000), margin=0.7)
 
 
 def test_a_small_system_ends_early() -> None:
-    found = lanczos_step(lambda x: np.array([1.0, 4.0, 9.0]) * x, np.ones(3), margin=0.0)
+    found = CriticalStep.by_lanczos(lambda x: np.array([1.0, 4.0, 9.0]) * x, np.ones(3), margin=0.0)
     assert found.products == 3
     assert found.limit == pytest.approx(2 / 3, rel=1e-12)
     assert found.safe == pytest.approx(2 / 3, rel=1e-6)
@@ -81,7 +77,7 @@ def test_a_small_system_ends_early() -> None:
 def test_central_difference_is_stable_below_the_limit_only(ratio: float, stable: bool) -> None:
     """The spectral radius of the undamped step map (u, u_old) -> (2 u - h^2 A u - u_old, u)."""
     system = block(2)
-    h = ratio * critical_step(system).lanczos
+    h = ratio * CriticalStep.of(system).lanczos
     A = system.K[system.free][:, system.free].toarray() / system.masses[system.free][:, None]
     one = np.eye(len(A))
     radius = np.abs(np.linalg.eigvals(np.block([[2 * one - h * h * A, -one], [one, 0 * one]])))
@@ -95,7 +91,7 @@ def test_a_single_cell_is_its_own_bound(d: int) -> None:
     kind = "tri3" if d == 2 else "tet4"
     mesh = Mesh(corners, np.arange(d + 1)[None], kind, {})  # type: ignore[arg-type]
     system = build(Scene(mesh, GEL))
-    found = critical_step(system)
+    found = CriticalStep.of(system)
     assert found.element == pytest.approx(exact_limit(system), rel=1e-12)
     assert found.lanczos == pytest.approx(found.element, rel=1e-9)
     c = np.sqrt((GEL.bulk_modulus + 4 / 3 * GEL.shear_modulus) / 1000)
@@ -116,7 +112,7 @@ def test_a_sliver_is_named_and_eq_16_exaggerates_it() -> None:
     split = [np.where(np.arange(4) == i, new, corners) for i in range(4)]
     cells = np.vstack([np.delete(mesh.cells, cell, axis=0), split])
     system = build(Scene(Mesh(nodes, cells, "tet4", dict(mesh.facets)), GEL, HELD))
-    found = critical_step(system)
+    found = CriticalStep.of(system)
     assert found.cell == len(cells) - 4
     assert f"cell {len(cells) - 4} (altitude" in found.limited_by
     assert found.eq_16_altitude < 0.5 * found.lanczos
@@ -126,9 +122,9 @@ def test_a_sliver_is_named_and_eq_16_exaggerates_it() -> None:
 def test_a_stiff_region_limits_the_step() -> None:
     scene = block().scene
     stiff = Region("bone", np.array([7]), replace(GEL, E=3e6))
-    found = critical_step(build(replace(scene, regions=(stiff,))))
+    found = CriticalStep.of(build(replace(scene, regions=(stiff,))))
     assert found.cell == 7
-    assert found.eq_16_altitude == pytest.approx(0.1 * critical_step(block()).eq_16_altitude)
+    assert found.eq_16_altitude == pytest.approx(0.1 * CriticalStep.of(block()).eq_16_altitude)
     assert element_frequencies(scene).max() < 0.2 * 2 / (found.element or np.inf)
 
 
@@ -153,7 +149,7 @@ def five_tets(n: int, size: float) -> Mesh:
 
 def test_eq_16_is_no_safe_step_on_a_regular_mesh() -> None:
     """An earlier study: the least altitude allows 283 us, the limit is 268.7 us."""
-    found = critical_step(build(Scene(five_tets(9, 0.1), GEL, HELD)))
+    found = CriticalStep.of(build(Scene(five_tets(9, 0.1), GEL, HELD)))
     assert found.eq_16_altitude == pytest.approx(283e-6, abs=0.5e-6)
     assert found.lanczos == pytest.approx(268.7e-6, abs=0.05e-6)
     assert found.eq_16_edge == pytest.approx(1.8 * found.lanczos, rel=0.05)
@@ -177,16 +173,16 @@ def test_the_limit_of_a_stretched_body_is_lower() -> None:
 
     def limit(u: Floats) -> float:
         K = body.tangent(u)[free][:, free]
-        return lanczos_step(lambda x: K @ x, masses).limit
+        return CriticalStep.by_lanczos(lambda x: K @ x, masses).limit
 
     rest = limit(np.zeros(scene.mesh.nodes.size))
-    assert rest == pytest.approx(critical_step(system).lanczos, rel=1e-9)
+    assert rest == pytest.approx(CriticalStep.of(system).lanczos, rel=1e-9)
     assert limit(0.3 * scene.mesh.nodes.ravel()) / rest == pytest.approx(0.62, abs=0.005)
 
 
 def test_a_missing_density_is_named() -> None:
     with pytest.raises(SceneError, match="set rho kg/m3"):
-        critical_step(build(Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), HELD)))
+        CriticalStep.of(build(Scene(box((1.0, 1.0, 1.0), (1, 1, 1)), Material(1e4, 0.3), HELD)))
 
 
 def test_what_has_no_critical_step_is_reported() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from validate.errors import ComparisonError
 from validate.identify import recorded_motion as module
-from validate.identify.recorded_motion import Ringing, spectrum
+from validate.identify.recorded_motion import Ringing
 
 # private: _peak: replaced, to bring a case about.
 
@@ -53,7 +53,7 @@ def test_what_does_not_ring_is_refused() -> None:
 
 
 def test_the_spectrum_peaks_where_it_rings_with_its_amplitude() -> None:
-    f, amplitude = spectrum(T, 2e-3 * np.cos(2 * np.pi * 8.0 * T) + 5 * T**2 - T)
+    f, amplitude = Ringing.spectrum(T, 2e-3 * np.cos(2 * np.pi * 8.0 * T) + 5 * T**2 - T)
     assert f[amplitude.argmax()] == pytest.approx(8.0, abs=0.1)
     assert amplitude.max() == pytest.approx(2e-3, rel=0.02)
 

@@ -1,12 +1,7 @@
 """Shipped experiments import the listed public API and their neighbours: a user's own can do the
-same.
-
-`unlisted_imports.toml` has the exceptions, by module. It only shrinks: a name that is listed or no
-longer imported must leave it.
-"""
+same."""
 
 import ast
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
@@ -14,8 +9,6 @@ from types import ModuleType
 import pytest
 from script_modules import module_of
 from tree import nodes
-
-EXCEPTIONS = Path(__file__).with_name("unlisted_imports.toml")
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +40,7 @@ def test_shipped_experiments_import_listed_names_only(
         for path in sorted(root.rglob("*.py"))
         if (names := unlisted(path, public))
     }
-    excepted = tomllib.loads(EXCEPTIONS.read_text("utf-8"))
-    assert found == {module: sorted(names) for module, names in excepted.items()}
+    assert found == {}
 
 
 def test_an_import_beyond_the_list_is_found(tmp_path: Path, public: frozenset[str]) -> None:

@@ -19,7 +19,7 @@ from validate.scene.scene import Scene
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.types import Run
-from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of
 
 TRUTH = (10e3, 0.3)
 STAGE = np.linspace(0, LOADS[-1], STEPS + 1)[1:]
@@ -57,7 +57,7 @@ def recorded(true: Scene, run: Run, seed: int) -> Recording:
     force = Reading(run.traces["stage.force"].y, "N", 1e-4)
     at = {name: np.array(x) for name, x in FIDUCIALS.items()}
     camera, readings = Camera(1e-6, 1, still=10_000), {"stage": Reading(STAGE, "m"), "cell": force}
-    return record_tracked(Origin("moved", seed, True), points_of(run, true), at, camera, readings)
+    return Origin("moved", seed, True).record(points_of(run, true), at, camera, readings)
 
 
 @pytest.mark.slow

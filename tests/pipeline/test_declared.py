@@ -21,7 +21,7 @@ from validate.pipeline.experiment.options import Options, configure
 from validate.pipeline.experiment.tree import changed_by
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.register.scene_registration import as_declared
+from validate.register.registration import as_declared
 from validate.scene.geometries.specification import Box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material

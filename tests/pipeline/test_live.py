@@ -43,7 +43,6 @@ from validate.pipeline.live.listener import (
     position_of,
 )
 from validate.pipeline.live.live_recording import _from_rest
-from validate.pipeline.live.preparation import recorded_tip
 from validate.pipeline.run.pipeline import compare
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
@@ -488,9 +487,9 @@ def test_a_tip_recorded_at_different_times_is_refused() -> None:
         "r", Source("r", "", 0, ""), 0, signals={"tip.x": signal(t), "tip.y": signal(t + 1)}
     )
     with pytest.raises(RecordingError, match=r"r: tip.x.*tip.y have \[3, 3\] samples"):
-        recorded_tip(recording, 2)
+        RecordedPath.of(recording, 2)
     with pytest.raises(RecordingError, match=r"tip.x, tip.y.*'tip'"):
-        recorded_tip(replace(recording, signals={"a": signal(t)}), 2)
+        RecordedPath.of(replace(recording, signals={"a": signal(t)}), 2)
 
 
 def test_a_path_that_does_not_begin_at_rest_has_rest_a_tick_before() -> None:

@@ -21,7 +21,6 @@ from validate.pipeline.run.twin_record import stamped
 from validate.recording.types import Recording
 from validate.register.markers.markers import MarkerObservation
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.register.signals import SignalObservation, holds_at
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
@@ -30,7 +29,7 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march, output_frames
 from validate.solve.types import Ending, State, Stepper
-from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of
 
 DT, STEPS, SIDE = 0.002, 30, 0.01
 PROBES = {"node_A": (SIDE, SIDE, SIDE), "node_B": (0.0, SIDE, 2 * SIDE / 3)}
@@ -75,8 +74,7 @@ def true_run(tree: Tree, frames: int = 200) -> tuple[Scene, Any]:
 
 def record(tree: Tree, progress: Callable[[str], None]) -> Recording:
     true, run = true_run(tree)
-    return record_tracked(
-        Origin("tiny", 3, True),
+    return Origin("tiny", 3, True).record(
         points_of(run, true),
         {k: np.array(v) for k, v in FIDUCIALS.items()},
         Camera(tree.settings.sd, 1, tree.settings.twin.missing, still=10_000),
@@ -159,7 +157,7 @@ TINY = Experiment(
     accepted=("fem",),
     accept=(Accept("node_B", 1e-4, "ours"),),
     load=lambda tree, folder: (stamped(record(tree, print), tree),),
-    place=lambda recording, tree, its: follow_signal(recording, its.mesh, "pull", "N"),
+    place=lambda recording, tree, its: Registered.following(recording, its.mesh, "pull", "N"),
     sets=sets,
     axis="z",
     reference="fem",
@@ -199,7 +197,7 @@ def record_moved(tree: Tree, progress: Callable[[str], None]) -> Recording:
     }
     at = {k: np.array(v) for k, v in FIDUCIALS.items()}
     camera = Camera(tree.settings.sd, 1, tree.settings.twin.missing, still=10_000)
-    return record_tracked(Origin("moved", 3, True), points_of(run, true), at, camera, readings)
+    return Origin("moved", 3, True).record(points_of(run, true), at, camera, readings)
 
 
 def moved_truth(tree: Tree, seen: Registered) -> Truth:

@@ -15,7 +15,6 @@ from validate.recording.clocks.alignment import (
     _only_peak,
     declared_offset,
     matched,
-    offset_by_correlation,
     rebased,
     refined_lag,
     shift,
@@ -23,7 +22,7 @@ from validate.recording.clocks.alignment import (
 from validate.recording.clocks.events import event_time, offset_by_event
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Signal
 
 # private: _on_grid: called alone, case by case.
@@ -61,9 +60,9 @@ RATES = [(100.0, 100.0), (100.0, 37.0), (40.0, 133.0), (20.0, 25.0)]
 def test_correlation_finds_the_truth_to_a_tenth_of_a_sample(
     rates: tuple[float, float], offset: float
 ) -> None:
-    found = offset_by_correlation(*pair(rates, offset, 0.0, 0), SEARCH)
+    found = Offset.by_correlation(*pair(rates, offset, 0.0, 0), SEARCH)
     assert abs(found.seconds - offset) * max(rates) < 0.02  # without noise
-    noisy = offset_by_correlation(*pair(rates, offset, 0.002, 1), SEARCH)
+    noisy = Offset.by_correlation(*pair(rates, offset, 0.002, 1), SEARCH)
     assert abs(noisy.seconds - offset) * max(rates) < 0.1
     assert noisy.method == "correlation"
 
@@ -73,7 +72,7 @@ def test_correlation_finds_the_truth_to_a_tenth_of_a_sample(
 def test_the_uncertainty_of_a_correlation_is_calibrated(rates: tuple[float, float]) -> None:
     truths = np.random.default_rng(3).uniform(-0.8, 0.8, 3 * SEEDS)
     found = [
-        offset_by_correlation(*pair(rates, truth, 0.02, seed), SEARCH)
+        Offset.by_correlation(*pair(rates, truth, 0.02, seed), SEARCH)
         for seed, truth in enumerate(truths)
     ]
     z = np.array([(f.seconds - t) / f.sd for f, t in zip(found, truths, strict=True)])
@@ -98,7 +97,7 @@ def test_too_small_an_overlap_is_refused_with_its_share(offset: float) -> None:
         matched(reference, stream, Offset(offset, 0.0, "test", 0, 0.0))
     late = replace(stream, t=stream.t + offset)
     with pytest.raises(RecordingError, match=r"overlap by .* % at most; at least 50 %"):
-        offset_by_correlation(reference, late, 1.0)
+        Offset.by_correlation(reference, late, 1.0)
 
 
 T = np.arange(0, 10, 0.01)
@@ -115,14 +114,14 @@ def test_ambiguous_signals_are_refused(name: str, noise: float) -> None:
     y, says = AMBIGUOUS[name]
     says = says.replace(" 0 N", "") if noise else says
     with pytest.raises(RecordingError, match=says):
-        offset_by_correlation(signal(T, y, noise, 1), signal(T - 0.123, y, noise, 2), 2.5)
+        Offset.by_correlation(signal(T, y, noise, 1), signal(T - 0.123, y, noise, 2), 2.5)
 
 
 def test_the_other_lag_of_an_ambiguous_pair_is_named() -> None:
     """A sine of one second: the rival lies a whole number of periods from the best."""
     y = AMBIGUOUS["sine"][0]
     with pytest.raises(RecordingError, match="ambiguous") as told:
-        offset_by_correlation(signal(T, y, 0.05, 1), signal(T - 0.123, y, 0.05, 2), 2.5)
+        Offset.by_correlation(signal(T, y, 0.05, 1), signal(T - 0.123, y, 0.05, 2), 2.5)
     best, other = (float(x) for x in re.findall(r" at ([-+][\d.]+) s", str(told.value)))
     periods = abs(best - other)
     assert round(periods) >= 1
@@ -133,11 +132,11 @@ def test_unrelated_signals_and_offsets_beyond_the_search_are_refused() -> None:
     bumps = [np.exp(-(((T - c) / 0.2) ** 2)) for c in (2.0, 3.0, 7.0)]
     one, other = signal(T, bumps[0] - 2 * bumps[1]), signal(T, motion(T) - bumps[2], 0.5, 4)
     with pytest.raises(RecordingError, match=r"correlate by|ambiguous"):
-        offset_by_correlation(one, other, 1.0)
+        Offset.by_correlation(one, other, 1.0)
     with pytest.raises(RecordingError, match="edge of the search"):
-        offset_by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.5)
+        Offset.by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.5)
     with pytest.raises(RecordingError, match="expected a range above 0"):
-        offset_by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.0)
+        Offset.by_correlation(*pair((100.0, 100.0), 0.8, 0.0, 0), 0.0)
 
 
 def event(kind: str, t: np.ndarray) -> np.ndarray:
@@ -173,7 +172,7 @@ def test_events_that_are_none_or_several_are_refused() -> None:
 def test_a_shift_is_kept_shown_and_not_made_twice(tmp_path: Path) -> None:
     recording = sample_recording()
     offset = Offset(-0.0025, 1e-4, "correlation", 7, 1.0)
-    moved = shift(recording, "/force", offset)
+    moved = offset.shift(recording, "/force")
     path = tmp_path / "moved.mcap"
     write_recording(moved, path)
     read = read_recording(path)
@@ -184,13 +183,13 @@ def test_a_shift_is_kept_shown_and_not_made_twice(tmp_path: Path) -> None:
         "seconds": "-0.0025", "sd": "0.0001", "method": "correlation", "count": "7",
         "coverage": "1.0",
     }  # fmt: skip
-    (line,) = inspect_recording(path).clock_offsets
+    (line,) = Inspection.of(path).clock_offsets
     assert "/force" in line
     assert "seconds -0.0025" in line
     with pytest.raises(RecordingError, match=r"shifted by -0\.0025 s before"):
-        shift(moved, "/force", offset)
+        offset.shift(moved, "/force")
     with pytest.raises(RecordingError, match="no stream 'force' to shift"):
-        shift(recording, "force", offset)
+        offset.shift(recording, "force")
 
 
 def test_a_clock_without_date_never_runs_below_zero() -> None:
@@ -259,7 +258,7 @@ def test_what_cannot_be_aligned_is_reported_with_its_numbers() -> None:
     one = signal(T, motion(T))
     for stream in (wide, signal(T[:7], motion(T[:7]))):
         with pytest.raises(RecordingError, match=r"stream: (2 columns|7 samples)"):
-            offset_by_correlation(one, stream, 1.0)
+            Offset.by_correlation(one, stream, 1.0)
     with pytest.raises(RecordingError, match=r"needs 1 column.*2"):
         event_time(wide, "onset")
     with pytest.raises(RecordingError, match=r"between 3 and 3.02 s; "):

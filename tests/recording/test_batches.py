@@ -12,7 +12,7 @@ from validate.errors import RecordingError
 from validate.recording.mcap.channel_state import batch
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import MARKERS, SIGNAL, decode
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Recording
 
 COUNT = 600  # more than two batches
@@ -108,7 +108,7 @@ def test_inspection_says_what_reading_says(tmp_path: Path, schema: str, old: str
     at = COUNT - 70
     messages[at] = ("/t", schema, T0 + at * MS, _swapped(schema, at, old, new))
     path = write_foreign(tmp_path / "f.mcap", messages, chunk_size=40_000)
-    got, read = inspect_recording(path), _read(path)
+    got, read = Inspection.of(path), _read(path)
     assert got.topics[0].count == COUNT
     if isinstance(read, str):
         assert got.defects[0] == read.removeprefix("f.mcap: ")

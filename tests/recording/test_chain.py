@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from validate.errors import RecordingError, UsageError
 from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import chain_faults, links, pose_signals, require_chain
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.readers import read_recording, recognised
 from validate.recording.scales import odd_scales
 from validate.recording.types import Markers, Recording, Signal, Source
@@ -117,7 +117,7 @@ def test_every_road_tells_it(tmp_path: Path) -> None:
     """Of a file of ours too: inspected as a defect, refused where it is read."""
     R, x = joined()
     write_recording(recording(StylusToRoom=(R, x + 0.05)), tmp_path / "r.mcap")
-    (line,) = inspect_recording(tmp_path / "r.mcap").defects
+    (line,) = Inspection.of(tmp_path / "r.mcap").defects
     assert "contradicts the way by 'Tracker'" in line
     with pytest.raises(RecordingError, match="contradicts the way"):
         read_recording(tmp_path / "r.mcap")

@@ -9,6 +9,7 @@ import pytest
 import scipy.io
 from script_modules import module_of
 
+from experiments.fluid_phantom.phantom import outlines_in
 from validate.errors import RecordingError
 from validate.recording.outlines import outline
 from validate.recording.outlines.outline import (
@@ -18,12 +19,11 @@ from validate.recording.outlines.outline import (
     ellipse_points,
     extract_outline,
     off_curve,
-    outlines_of,
 )
 from validate.recording.outlines.polar import Grey, closed_path, speckle_area
 from validate.recording.types import Frames
 from validate.register.outlines.outlines import normal_distances
-from validate.twin.ultrasound import Scanner, Target, b_mode
+from validate.twin.ultrasound import Scanner, Target
 
 # private: _fitted: points of a known misfit.
 # private: _next, _require_sure: called alone, case by case.
@@ -39,7 +39,7 @@ def ellipse(x: float, y: float, a: float, b: float, turn: float = 0.0) -> np.nda
 
 
 def image(outline: np.ndarray | None, seed: int = 0, **target: float) -> np.ndarray:
-    return b_mode(SMALL, Target(outline, **target), np.random.default_rng(seed))
+    return SMALL.b_mode(Target(outline, **target), np.random.default_rng(seed))
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_the_wall_is_where_half_of_the_power_is_left() -> None:
     found = []
     for seed, shown in enumerate([45.0, 60.0, 80.0]):
         scanner = Scanner(width=200, height=200, dynamic_range=shown)
-        frame = b_mode(scanner, Target(truth, level=-25.0), np.random.default_rng(seed))
+        frame = scanner.b_mode(Target(truth, level=-25.0), np.random.default_rng(seed))
         found.append(extract_outline(frame, PX, centre=(10e-3, 10e-3), radius=5e-3))
     assert np.mean([o.radius for o in found]) == pytest.approx(5e-3, abs=0.06e-3)
     assert all(o.moved > 0.1e-3 for o in found)  # the path alone lies this far inward
@@ -120,8 +120,7 @@ def test_rough_hints_lead_to_the_same_outline() -> None:
 
 def test_a_hint_chooses_the_second_region() -> None:
     second = ellipse(15e-3, 15e-3, 2.5e-3, 2.5e-3)
-    frame = b_mode(
-        SMALL,
+    frame = SMALL.b_mode(
         Target(ellipse(7e-3, 7e-3, 4e-3, 4e-3), level=-30.0, second=second, second_level=-18.0),
         np.random.default_rng(3),
     )
@@ -141,8 +140,7 @@ def test_pixels_need_not_be_square() -> None:
 
 def test_bright_regions_by_option() -> None:
     truth = ellipse(10e-3, 10e-3, 4.5e-3, 4e-3)
-    frame = b_mode(
-        Scanner(width=200, height=200, gain=-35.0),
+    frame = Scanner(width=200, height=200, gain=-35.0).b_mode(
         Target(truth, level=18.0),
         np.random.default_rng(5),
     )
@@ -259,7 +257,7 @@ def test_images_of_other_kinds_are_refused() -> None:
 def test_outlines_of_frames_are_contours_and_none_is_left_out() -> None:
     frames = tuple(image(ellipse(10e-3, 10e-3 + d, 4e-3, 4e-3), level=-25.0) for d in (0, 5e-4))
     pose = np.diag([1.0, -1.0, -1.0, 1.0])
-    got = outlines_of(Frames(np.array([0.0, 1.0]), frames, PX, pose, "phantom"))
+    got = outlines_in(Frames(np.array([0.0, 1.0]), frames, PX, pose, "phantom"), "b_mode")
     assert np.array_equal(got.pose, pose)
     assert got.frame == "phantom"
     assert 0.02e-3 < got.sd < 0.2e-3
@@ -267,7 +265,7 @@ def test_outlines_of_frames_are_contours_and_none_is_left_out() -> None:
     assert moved == pytest.approx([0, 5e-4], abs=0.1e-3)
     empty = Frames(np.array([0.0, 1.0, 2.5]), (*frames, image(None)), PX, pose, "phantom")
     with pytest.raises(RecordingError, match=r"1 of 3 images .*image 2 \(t = 2.500 s\)"):
-        outlines_of(empty)
+        outlines_in(empty, "b_mode")
 
 
 def test_outlines_are_checked_and_read_only() -> None:
@@ -295,7 +293,7 @@ def flat(count: int) -> Frames:
 
 def test_even_images_are_counted_and_the_first_is_named() -> None:
     with pytest.raises(RecordingError, match=r"2 of 2 images .*image 0 \(t = 0.000 s\)"):
-        outlines_of(flat(2))
+        outlines_in(flat(2), "b_mode")
     with pytest.raises(RecordingError, match=r"3 of 3 images .*image 0 \(t = 0.000 s\)"):
         outline.followed(flat(3), outline.Hint(None, None), "images")
 

@@ -29,7 +29,7 @@ from validate.recording.images.png_stack import numbered, read_png_stack
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.schemas import IMAGE, SCHEMAS
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Contours, Frames, Markers, Recording
 
 RNG = np.random.default_rng(3)
@@ -123,7 +123,7 @@ def test_messages_are_foxglove_images(tmp_path: Path) -> None:
 
 def test_inspection_names_frames_and_their_unit(tmp_path: Path) -> None:
     write_recording(RECORDING, tmp_path / "a.mcap")
-    got = inspect_recording(tmp_path / "a.mcap")
+    got = Inspection.of(tmp_path / "a.mcap")
     assert got.defects == ()
     assert [(t.kind, t.unit, t.frame, t.count) for t in got.topics] == [
         ("frames", "grey level", "phantom", 3)
@@ -174,7 +174,7 @@ def test_images_without_calibration_are_listed_as_a_defect(tmp_path: Path) -> No
     messages = [("/us", IMAGE, T0, _image()), ("/s", "validate.Signal", T0, signal_json(T0))]
     path = write_foreign(tmp_path / "f.mcap", messages)
     assert not read_recording(path).frames
-    got = inspect_recording(path)
+    got = Inspection.of(path)
     assert got.defects == ("'/us': images without record 'calibration//us'",)
     assert [t.kind for t in got.topics] == ["foreign", "signal"]
 

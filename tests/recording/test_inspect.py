@@ -12,20 +12,20 @@ from mcap.writer import IndexType
 from mcap_samples import T0, markers_json, sample_recording, signal_json, write_foreign
 
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Frames
 
 MS = 1_000_000
 
 
 def _defects(path: Path, messages: list[tuple[str, str, int, Any]], **options: Any) -> list[str]:
-    return list(inspect_recording(write_foreign(path / "f.mcap", messages, **options)).defects)
+    return list(Inspection.of(write_foreign(path / "f.mcap", messages, **options)).defects)
 
 
 def test_a_sound_recording_has_topics_units_and_no_defects(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write_recording(sample_recording(), path)
-    got = inspect_recording(path)
+    got = Inspection.of(path)
     assert got.defects == ()
     assert (got.library, got.compressions, got.chunks, got.messages) == (
         "validate",
@@ -54,13 +54,13 @@ def test_a_pixel_beyond_reason_is_a_defect(tmp_path: Path, side: float) -> None:
     frames = Frames(np.array([0.0]), (image,), (side, 1e-4), np.eye(4), "probe")
     write_recording(replace(sample_recording(), frames={"/us": frames}), tmp_path / "a.mcap")
     odd = "'/us': 0.1 x 0.0001 m per pixel is outside 1e-06 to 0.01 m"
-    assert inspect_recording(tmp_path / "a.mcap").defects == ((odd,) if side == 0.1 else ())
+    assert Inspection.of(tmp_path / "a.mcap").defects == ((odd,) if side == 0.1 else ())
 
 
 def test_an_inspection_is_frozen_and_plain_json(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     write_recording(sample_recording(), path)
-    got = inspect_recording(path)
+    got = Inspection.of(path)
     with pytest.raises(FrozenInstanceError):
         got.messages = 0  # type: ignore[misc]
     plain = json.loads(json.dumps(got.to_dict(), allow_nan=False))
@@ -99,7 +99,7 @@ def test_small_differences_of_the_clocks_are_none(tmp_path: Path) -> None:
 
 def test_a_broken_topic_does_not_hide_the_others(tmp_path: Path) -> None:
     broken = [("/m", "validate.Markers", T0, markers_json(T0, x=[1]))]
-    got = inspect_recording(write_foreign(tmp_path / "f.mcap", broken + _stamped(0, 10)))
+    got = Inspection.of(write_foreign(tmp_path / "f.mcap", broken + _stamped(0, 10)))
     assert got.defects == ("'/m' message 0: lengths of x, y, z differ: [1, 2, 2]",)
     assert [(t.name, t.count, t.unit) for t in got.topics] == [("/m", 1, ""), ("/s", 2, "N")]
 

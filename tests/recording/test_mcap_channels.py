@@ -16,7 +16,7 @@ from validate.recording.mcap.write import (
     json_schema,
     write_channels,
 )
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 
 NUMBER = WrittenChannel("/a", json_schema("own.Number", {"type": "object"}), {"unit": "N"})
 TEXT = WrittenChannel("/b", json_schema("own.Text", {"type": "object"}))
@@ -41,7 +41,7 @@ def test_all_returns(tmp_path: Path) -> None:
         ("/b", 5, 0, b'{"text":"zw\\u00f6lf"}'),
         ("/a", 7, 1, b'{"v":1e-300}'),
     ]
-    seen = inspect_recording(path)
+    seen = Inspection.of(path)
     assert seen.defects == ()
     assert seen.source.integrity == "verified"
     assert seen.metadata == ("about",)
@@ -63,7 +63,7 @@ def test_one_flipped_bit_is_found(tmp_path: Path) -> None:
     for at in range(8, len(whole) // 2, 7):  # data section
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
         with pytest.raises(RecordingError):
-            inspect_recording(path)
+            Inspection.of(path)
 
 
 @given(st.lists(st.integers(0, LAST_NS), max_size=20).map(sorted))

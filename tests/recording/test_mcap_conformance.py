@@ -9,7 +9,7 @@ import pytest
 from validate.errors import RecordingError
 from validate.recording.mcap.decoders import messages_in
 from validate.recording.mcap.read import read_recording
-from validate.recording.preflight import Inspection, inspect_recording
+from validate.recording.preflight import Inspection
 
 ROS2 = {
     "talker": 20,
@@ -44,7 +44,7 @@ def test_every_conformance_file_holds_what_its_json_says(shared_data: Path) -> N
     assert len(files) == 174
     total = 0
     for path in files:
-        got = inspect_recording(path)
+        got = Inspection.of(path)
         _check(got, _expected(path))
         json.dumps(got.to_dict(), allow_nan=False)
         total += got.messages
@@ -59,7 +59,7 @@ def test_no_conformance_file_holds_a_topic_of_ours(shared_data: Path) -> None:
 
 @pytest.mark.parametrize(("name", "count"), ROS2.items())
 def test_ros2_recordings_are_listed_whole(shared_data: Path, name: str, count: int) -> None:
-    got = inspect_recording(shared_data / "mcap" / "ros2" / f"{name}.mcap")
+    got = Inspection.of(shared_data / "mcap" / "ros2" / f"{name}.mcap")
     assert got.messages == sum(t.count for t in got.topics) == count
     assert got.profile == "ros2"
     assert {t.kind for t in got.topics} == {"foreign"}
@@ -68,14 +68,14 @@ def test_ros2_recordings_are_listed_whole(shared_data: Path, name: str, count: i
 
 def test_what_rosbag2_always_writes_is_no_defect(shared_data: Path) -> None:
     """Channels without messages, and its record once for every split."""
-    got = inspect_recording(shared_data / "mcap" / "ros2" / "topics_and_services.mcap")
+    got = Inspection.of(shared_data / "mcap" / "ros2" / "topics_and_services.mcap")
     assert sum(t.count == 0 for t in got.topics) == 3
     assert got.metadata == ("rosbag2", "rosbag2")
     assert not [d for d in got.defects if d.endswith("no messages") or "rosbag2" in d]
 
 
 def test_a_dds_recording_is_listed(shared_data: Path) -> None:
-    got = inspect_recording(shared_data / "mcap" / "dds" / "configuration_type.mcap")
+    got = Inspection.of(shared_data / "mcap" / "dds" / "configuration_type.mcap")
     assert (got.messages, got.attachments, got.metadata) == (12, 1, ("version",))
     assert got.facts == ("attachment dynamic_types: no media type, 685 bytes",)
     assert {t.name: t.count for t in got.topics} == {

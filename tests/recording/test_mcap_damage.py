@@ -17,7 +17,7 @@ from validate.errors import RecordingError
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.records import MAX_RECORD, unpack
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Recording
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -132,7 +132,7 @@ def _record_starts(data: bytes, wanted: int) -> list[int]:
 def test_what_is_no_mcap_is_named(tmp_path: Path, data: bytes, message: str) -> None:
     path = tmp_path / "x.mcap"
     path.write_bytes(data)
-    for use in (read_recording, inspect_recording):
+    for use in (read_recording, Inspection.of):
         with pytest.raises(RecordingError, match=message):
             use(path)
 
@@ -200,7 +200,7 @@ MESSAGE = _record(0x05, struct.pack("<HIQQ", 1, 0, 5, 5))
 def test_the_forged_parts_make_a_readable_file(tmp_path: Path) -> None:
     path = tmp_path / "f.mcap"
     path.write_bytes(_file(SCHEMA, CHANNEL, MESSAGE, _record(0x90, b"private")))
-    got = inspect_recording(path)
+    got = Inspection.of(path)
     assert (got.messages, got.topics[0].first_ns) == (1, 5)
     assert got.defects == ("1 records of unknown kind",)
 
@@ -251,7 +251,7 @@ def test_forged_records_are_refused(tmp_path: Path, records: list[bytes], messag
     path = tmp_path / "f.mcap"
     path.write_bytes(_file(*records))
     with pytest.raises(RecordingError, match=message):
-        inspect_recording(path)
+        Inspection.of(path)
 
 
 def test_a_forged_size_takes_no_memory() -> None:
@@ -269,7 +269,7 @@ def test_attachments_with_the_right_crc_pass(tmp_path: Path) -> None:
     body = bytes(16) + struct.pack("<IIQ2s", 0, 0, 2, b"ab")
     path = tmp_path / "f.mcap"
     path.write_bytes(_file(_record(0x09, body + struct.pack("<I", zlib.crc32(body)))))
-    assert inspect_recording(path).attachments == 1
+    assert Inspection.of(path).attachments == 1
 
 
 @pytest.mark.parametrize("limit", ["mcap.streams.MAX_NUMBERS", "mcap.integrity.MAX_MESSAGES"])

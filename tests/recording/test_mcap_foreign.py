@@ -28,7 +28,7 @@ from validate.errors import RecordingError, UsageError
 from validate.recording.mcap import third_party_channels
 from validate.recording.mcap.decoders import messages_in
 from validate.recording.mcap.read import read_all
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 
 ROS2 = Path("mcap/ros2")
 HEADER = "std_msgs/Header header\n"
@@ -324,7 +324,7 @@ def test_a_number_of_any_message_comes_in_by_its_path(encoding: str, tmp_path: P
 def test_counts_of_recordings_by_rosbag2_and_no_defect_in_its_habits(
     name: str, topics: dict[str, int], shared_data: Path
 ) -> None:
-    got = inspect_recording(shared_data / ROS2 / f"{name}.mcap")
+    got = Inspection.of(shared_data / ROS2 / f"{name}.mcap")
     assert {t.name: t.count for t in got.topics} == topics
     assert not [d for d in got.defects if "no messages" in d or "rosbag2" in d]
 

@@ -11,7 +11,7 @@ from mcap_samples import T0, markers_json, sample_recording, signal_json, write_
 from validate.errors import RecordingError
 from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 
 M, S, C = "validate.Markers", "validate.Signal", "validate.Contour"
 STEP = 10_000_000  # ns
@@ -244,7 +244,7 @@ def test_outlines_have_their_own_sd_all_or_none(tmp_path: Path) -> None:
     path = write_foreign(tmp_path / "g.mcap", messages, metadata=pose)
     with pytest.raises(RecordingError, match="only some outlines have an sd"):
         read_recording(path)
-    assert any("only some outlines" in d for d in inspect_recording(path).defects)
+    assert any("only some outlines" in d for d in Inspection.of(path).defects)
 
 
 def test_a_format_of_the_future_is_refused(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from mcap_samples import T0, markers_json, signal_json, write_foreign
 from validate.errors import RecordingError, UsageError
 from validate.recording.mcap import read as module
 from validate.recording.mcap.read import read_recording, recover
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 
 # private: _copy: called alone, case by case.
 
@@ -59,7 +59,7 @@ def test_what_is_recovered_is_a_prefix_bit_for_bit(tmp_path: Path, options: dict
         kept = _messages(out)
         count = len(kept)
         assert kept == every[:count]
-        seen, saved = inspect_recording(cut), inspect_recording(out)
+        seen, saved = Inspection.of(cut), Inspection.of(out)
         assert seen.messages == saved.messages == count
         assert f"{count} messages; the writer was stopped" in seen.defects[0]
         assert saved.source.integrity == "verified"
@@ -102,7 +102,7 @@ def test_a_cut_summary_misses_no_message(tmp_path: Path) -> None:
     path.write_bytes(data[:-4])
     assert "only the summary is truncated" in recover(path, tmp_path / "out.mcap").lines[2]
     assert _messages(tmp_path / "out.mcap") == _messages(tmp_path / "whole.mcap")
-    assert inspect_recording(path).defects[0].startswith("no end of the file, behind its data,")
+    assert Inspection.of(path).defects[0].startswith("no end of the file, behind its data,")
 
 
 def test_only_a_file_that_stops_short_is_recovered(tmp_path: Path) -> None:
@@ -115,7 +115,7 @@ def test_only_a_file_that_stops_short_is_recovered(tmp_path: Path) -> None:
     flipped = bytearray(cut.read_bytes())
     flipped[len(flipped) // 4] ^= 1
     cut.write_bytes(flipped)
-    for use in (lambda: recover(cut, out), lambda: inspect_recording(cut)):
+    for use in (lambda: recover(cut, out), lambda: Inspection.of(cut)):
         with pytest.raises(RecordingError, match="readable before it"):
             use()
     half = len(data) // 2

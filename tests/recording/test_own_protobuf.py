@@ -21,7 +21,7 @@ from validate.recording.mcap.schemas import (
     signal_message,
 )
 from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Recording
 
 POSE = {"pose/a": {"T_frame_from_image": " ".join(map(str, np.eye(4).ravel().tolist()))}}
@@ -39,7 +39,7 @@ def written(path: Path, schema: str, *contents: Json) -> Path:
 
 
 def back(path: Path) -> Recording:
-    assert inspect_recording(path).defects == ()
+    assert Inspection.of(path).defects == ()
     return read_recording(path)
 
 
@@ -81,4 +81,4 @@ def test_a_message_that_is_no_protobuf_is_refused(tmp_path: Path) -> None:
     write_channels(tmp_path / "s.mcap", [channel], [WrittenMessage("a", 0, b"\xff\xff")], {})
     with pytest.raises(RecordingError, match="'a' message 0: damaged"):
         read_recording(tmp_path / "s.mcap")
-    assert any("damaged" in d for d in inspect_recording(tmp_path / "s.mcap").defects)
+    assert any("damaged" in d for d in Inspection.of(tmp_path / "s.mcap").defects)

@@ -25,7 +25,7 @@ from sequences import tracked
 from validate.errors import RecordingError, UsageError, ValidateError
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.reader import Reader
 from validate.recording.readers import READERS, in_order, named, recognised
 from validate.recording.types import Signal
@@ -309,7 +309,7 @@ def test_an_export_in_utf_16_is_text(tmp_path: Path) -> None:
 def test_the_pre_flight_check_of_another_format_says_how_to_import_it(tmp_path: Path) -> None:
     path, _ = sample(named("instron"), tmp_path)
     with pytest.raises(ValidateError, match=r"validate import sample -o sample\.mcap"):
-        inspect_recording(path)
+        Inspection.of(path)
 
 
 def test_every_reader_is_in_the_tuple_and_has_a_sample(project_root: Path) -> None:

@@ -10,7 +10,7 @@ from mcap_samples import ABSENT, T0, sample_recording
 
 from validate.recording.images.image import encode_png
 from validate.recording.mcap.write import write_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.scales import odd_pixel, odd_scales
 from validate.recording.types import Contours, Frames, Recording, Signal
 
@@ -90,5 +90,5 @@ def test_a_recording_of_outlines_and_images_is_asked_back(tmp_path: Path) -> Non
     code, _, err = here(*merged)
     assert (code, err.count("\n")) == (0, 3)  # two scales, and that clocks are taken as one
     assert "a factor 1000 or 1000000?" in err
-    defects = inspect_recording(path).defects
+    defects = Inspection.of(path).defects
     assert sum("m per pixel is outside" in d or "outlines of 20 m" in d for d in defects) == 2

@@ -8,7 +8,7 @@ import pytest
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError
 from validate.fem.assembly.locate import nearest_node_rows
-from validate.recording.clocks.alignment import Offset, shift
+from validate.recording.clocks.alignment import Offset
 from validate.recording.types import Recording, Signal, Source
 from validate.register.clocks import clock_sd, interpolated, slopes
 from validate.register.markers.markers import MarkerObservation, Together
@@ -43,7 +43,7 @@ def recorded(sd: float = SD_T) -> Recording:
     force = Signal(T, 5 * T[:, None], "N", 0.1, "cell")
     stage = Signal(T, 1e-3 * T[:, None], "m", 0.0, "stage")
     plain = Recording("ramp", Source("x", "", 0, "x"), 0, signals={"force": force, "stage": stage})
-    return shift(plain, "force", Offset(0.0, sd, "correlation", 21, 1.0))
+    return Offset(0.0, sd, "correlation", 21, 1.0).shift(plain, "force")
 
 
 def test_a_ramps_clock_is_worth_its_speed() -> None:
@@ -57,7 +57,7 @@ def test_a_ramps_clock_is_worth_its_speed() -> None:
 
 
 def test_the_drives_clock_counts_in_every_stream_and_once() -> None:
-    moved = shift(recorded(0.03), "stage", Offset(0.0, 0.04, "correlation", 21, 1.0))
+    moved = Offset(0.0, 0.04, "correlation", 21, 1.0).shift(recorded(0.03), "stage")
     seen = Registered(
         (
             SignalObservation.driving(moved, "stage", "m"),

@@ -7,7 +7,7 @@ from experiments.stylus_phantom.touched_landmarks import tip_path
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.register.markers.transform import Similarity
-from validate.register.tools.landmarks import _joined, dwells, match_landmarks, sd_of_mean
+from validate.register.tools.landmarks import Dwell, _joined, match_landmarks, sd_of_mean
 
 # private: _joined: spans of a known gap.
 
@@ -26,7 +26,7 @@ def still(at: Floats, count: int) -> Floats:
 def test_a_dwell_is_where_the_tip_stands_without_its_coming_and_leaving() -> None:
     way = np.linspace(A, B, 12)[1:-1]
     t, x = path(still(A, 30), way, still(B, 20), way[::-1], still(A, 5))
-    first, second = dwells(t, x, 3e-3, 1.5)
+    first, second = Dwell.of_path(t, x, 3e-3, 1.5)
     assert (first.begin, first.end) == (0, 30)
     assert (second.begin, second.end) == (40, 60)
     np.testing.assert_allclose(second.centre, B, atol=1e-12)
@@ -36,21 +36,21 @@ def test_a_dwell_is_where_the_tip_stands_without_its_coming_and_leaving() -> Non
 def test_a_noisy_path_widens_the_radius() -> None:
     noise = np.random.default_rng(5).normal(0, 2e-3, (60, 3))
     t, x = path(still(A, 30), still(B, 30))
-    assert [(d.begin, d.end) for d in dwells(t, x + noise, 1e-3, 2.0)] == [(0, 30), (30, 60)]
+    assert [(d.begin, d.end) for d in Dwell.of_path(t, x + noise, 1e-3, 2.0)] == [(0, 30), (30, 60)]
 
 
 def test_a_single_false_sample_parts_no_dwell() -> None:
     x = still(A, 40)
     x[20] = [1.0, 1.0, 1.0]
     t = np.arange(40) / 10
-    (whole,) = dwells(t, x, 3e-3, 1.5)
+    (whole,) = Dwell.of_path(t, x, 3e-3, 1.5)
     assert (whole.begin, whole.end) == (0, 40)
 
 
 def test_the_first_touch_is_the_first_part_in_which_the_tip_holds() -> None:
     drift = np.linspace(0, 2e-3, 11)[:, None] * [1.0, 0.0, 0.0]
     t, x = path(drift, still(drift[-1], 20), drift[-1] + drift[::-1])
-    (whole,) = dwells(t, x, 5e-3, 1.0)
+    (whole,) = Dwell.of_path(t, x, 5e-3, 1.0)
     touch = whole.touch(1.0, 0.3e-3)
     assert len(touch.x) == 10
     np.testing.assert_allclose(touch.centre[0], 2e-3, atol=0.2e-3)
@@ -60,10 +60,10 @@ def test_the_first_touch_is_the_first_part_in_which_the_tip_holds() -> None:
 def test_white_noise_averages_and_a_slow_wander_does_not() -> None:
     rng, t = np.random.default_rng(2), np.arange(400) / 10
     white = rng.normal(0, 1e-3, (400, 3))
-    (d,) = dwells(t, white, 10e-3, 1.0)
+    (d,) = Dwell.of_path(t, white, 10e-3, 1.0)
     assert sd_of_mean((d,), (d,)) == pytest.approx(1e-3 / 20, rel=0.15)
     slow = 1e-3 * np.sin(np.linspace(0, 4 * np.pi, 400))[:, None] * [1.0, 1.0, 1.0]
-    (d,) = dwells(t, slow, 10e-3, 1.0)
+    (d,) = Dwell.of_path(t, slow, 10e-3, 1.0)
     assert sd_of_mean((d,), (d,)) == pytest.approx(1e-3 / np.sqrt(2), rel=0.05)
 
 

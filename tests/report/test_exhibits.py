@@ -30,7 +30,7 @@ from validate.report.export.tables import shown as read
 from validate.report.page.html import page
 from validate.report.scenes import gl
 from validate.report.scenes.body_scene import at_times, held
-from validate.report.scenes.maps import ranges, values
+from validate.report.scenes.maps import TOWARD_EYE, facing, ranges, screen, values
 from validate.report.sections.observations import holds
 from validate.report.sections.verdicts import band
 from validate.report.stored.exhibit_rows import rounded, thinned
@@ -372,3 +372,12 @@ def test_replay_shows_frames_at_their_own_times(folder: Path) -> None:
 
 def test_page_is_small(folder: Path) -> None:
     assert (folder / "report.html").stat().st_size < 1_500_000
+
+
+def test_facets_that_face_the_eye_are_half_of_a_box() -> None:
+    mesh = box((0.1, 0.1, 0.1), (2, 2, 2))
+    _, facets = facing(mesh, TOWARD_EYE)
+    assert len(facets) == len(mesh.surface) // 2
+    right, upward = screen(TOWARD_EYE)
+    frame = np.stack([right, upward, TOWARD_EYE])
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-12)

@@ -10,7 +10,7 @@ from chart_contract import faults
 from matplotlib.figure import Figure
 from report_samples import small_result
 
-from validate.recording.outlines.outline import outlines_of
+from experiments.fluid_phantom.phantom import outlines_in
 from validate.recording.types import Contours, Frames, Recording, Source
 from validate.register.markers.quality import Registration
 from validate.report.charts.style import WIDTH, painted
@@ -107,7 +107,7 @@ def recording() -> Recording:
     frames = Frames(np.array([0.0, 1.0]), (image(24), image(20)), (2e-4, 2e-4), np.eye(4), "body")
     return Recording(
         "r", Source("r.mcap", "", 0, "verified"), 0, frames={"b_mode": frames},
-        contours={"outline": outlines_of(frames, images="b_mode")},
+        contours={"outline": outlines_in(frames, "b_mode")},
     )  # fmt: skip
 
 

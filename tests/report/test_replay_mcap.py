@@ -29,7 +29,7 @@ from validate.arrays import Floats
 from validate.compare.result import Result
 from validate.installation import install_command
 from validate.recording.mcap.read import read_recording
-from validate.recording.preflight import inspect_recording
+from validate.recording.preflight import Inspection
 from validate.recording.types import Frames
 from validate.register.outlines.outlines import normal_distances
 from validate.register.outlines.plane import from_image
@@ -140,7 +140,7 @@ def test_counts_per_topic(messages: Messages) -> None:
 
 
 def test_inspected_without_defects(path: Path) -> None:
-    seen = inspect_recording(path)
+    seen = Inspection.of(path)
     assert seen.defects == ()
     assert seen.source.integrity == "verified"
     units = {t.name: t.unit for t in seen.topics if t.kind == "signal"}
@@ -574,7 +574,7 @@ def test_several_recordings_each_under_its_name(tmp_path: Path) -> None:
         "validate.pipeline", "input/cube_a", "input/cube_b"
     }  # fmt: skip
     assert "/somewhere" not in str(metadata(tmp_path / "replay.mcap"))
-    assert inspect_recording(tmp_path / "replay.mcap").defects == ()
+    assert Inspection.of(tmp_path / "replay.mcap").defects == ()
 
 
 def test_recordings_of_one_name_are_numbered() -> None:
@@ -596,7 +596,7 @@ def test_nothing_simulated_when_nothing_finished(tmp_path: Path) -> None:
 def test_without_recordings_only_metadata(tmp_path: Path) -> None:
     write_replay(bare_result(), tmp_path / "replay.mcap")
     assert read(tmp_path / "replay.mcap") == {}
-    assert inspect_recording(tmp_path / "replay.mcap").defects == ()
+    assert Inspection.of(tmp_path / "replay.mcap").defects == ()
 
 
 def test_a_signal_without_a_trace_is_named(tmp_path: Path) -> None:
@@ -658,7 +658,7 @@ def test_images_are_those_recorded(result: Result, tmp_path: Path) -> None:
     assert all(np.array_equal(*pair) for pair in zip(back.images, original.images, strict=True))
     assert back.m_per_px == original.m_per_px
     assert np.array_equal(back.pose, original.pose)
-    assert inspect_recording(tmp_path / "replay.mcap").defects == ()
+    assert Inspection.of(tmp_path / "replay.mcap").defects == ()
     (_, content), *_ = read(tmp_path / "replay.mcap")["/image/measured"]
     shown = cv2.imdecode(np.frombuffer(content["data"], np.uint8), cv2.IMREAD_UNCHANGED)
     assert content["format"] == "png"

@@ -8,7 +8,7 @@ from validate.errors import SceneError
 from validate.fem.laws.plane_stress import response
 from validate.parameters import describe, with_values
 from validate.scene.geometries.box import box
-from validate.scene.laws import LAWS, Coefficients, lost_stability
+from validate.scene.laws import LAWS, Coefficients
 from validate.scene.material import Material
 from validate.scene.meshless import MaterialPoint
 from validate.scene.scene import Scene
@@ -101,10 +101,10 @@ def test_a_fit_may_pass_through_unstable_coefficients_and_a_body_may_not() -> No
     """C10 1200, C01 -200 Pa: equal pulls lose their stiffness at (200/1200)^(1/4)."""
     c = Coefficients(C01=-200.0, stability="open")
     card = Material(2 * 1000 * 2 * 1.45, 0.45, "mooney_rivlin", coefficients=c)
-    lost = lost_stability(card.law, c, card.shear_modulus)
+    lost = c.lost_stability(card.law, card.shear_modulus)
     assert lost is not None
     assert (lost.mode, lost.stretch) == ("equibiaxial", pytest.approx(6**-0.25, rel=2e-3))
-    assert lost_stability("yeoh", Coefficients(C20=10.0), 1000.0) is None
+    assert Coefficients(C20=10.0).lost_stability("yeoh", 1000.0) is None
     pulled = response(MaterialPoint(card, "uniaxial"), np.array([1.0, 2.0]))["nominal_stress"]
     assert pulled[1] > 0
     with pytest.raises(SceneError, match="loses positive energy at stretch"):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from amplification import amplification
 from inertial_scenes import driven, small
 
 from experiments.bending_rod.body import bending_rod
@@ -12,12 +13,11 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build
 from validate.scene.material import Region
-from validate.solve.amplification import amplification
 from validate.solve.dynamic.linear import Moving
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
+from validate.solve.study_entries import explicit_maps, spectral_radii
 from validate.solve.types import Stepper
 
 SCHEMES = [
@@ -86,9 +86,7 @@ def test_the_misprinted_update_is_unstable_from(xi: float, limit: float) -> None
 
     def radius(x: float) -> float:
         c, k = np.array([2 * xi * x]), np.array([x * x])
-        return float(
-            spectral_radii(newmark_maps(Rule.of("average", 1.0), c, k, misprinted=True))[0]
-        )
+        return float(spectral_radii(Rule.of("average", 1.0).maps(c, k, misprinted=True))[0])
 
     assert radius(limit - 0.006) < 1 + 1e-9
     assert radius(limit + 0.006) > 1 + 1e-6
@@ -97,7 +95,7 @@ def test_the_misprinted_update_is_unstable_from(xi: float, limit: float) -> None
 
 def test_average_acceleration_neither_grows_nor_decays_undamped() -> None:
     x = np.array([0.01, 1.0, 100.0])
-    radii = spectral_radii(newmark_maps(Rule.of("average", 1.0), np.zeros(3), x**2))
+    radii = spectral_radii(Rule.of("average", 1.0).maps(np.zeros(3), x**2))
     assert radii == pytest.approx(np.ones(3), abs=1e-7)
 
 

@@ -8,7 +8,7 @@ from inertial_scenes import driven, orders, small
 
 from experiments.needle_block.body import MP2, needle_block
 from validate.errors import SceneError
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import DampingTerms, MassName, System, build, damping_of, mass_of
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear, highest_frequency
@@ -133,7 +133,7 @@ def test_the_highest_frequency_is_that_of_all_modes() -> None:
     K, M = (X[system.free][:, system.free].toarray() for X in (system.K, system.M))
     dense = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real.max())
     assert highest_frequency(system, "consistent") == pytest.approx(dense, rel=1e-9)
-    lanczos = critical_step(system, products=60).lanczos
+    lanczos = CriticalStep.of(system, products=60).lanczos
     assert 2 / highest_frequency(system, "lumped") == pytest.approx(lanczos, rel=1e-6)
 
 

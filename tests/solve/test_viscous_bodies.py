@@ -11,7 +11,7 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.estimate.extended.node_ekf import NodeEKF
 from validate.fem.assembly.assemble import stiffness
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.large_strain.hyperelastic import Body
 from validate.fem.laws.law import stiffened
 from validate.fem.laws.plane_stress import response
@@ -187,7 +187,7 @@ def test_the_critical_step_is_that_of_the_instantaneous_moduli() -> None:
         for system in (relaxing(soft), build(hard))
     ]
     assert limits[0] == pytest.approx(limits[1], rel=1e-12)
-    assert critical_step(relaxing(soft)) == critical_step(build(hard))
+    assert CriticalStep.of(relaxing(soft)) == CriticalStep.of(build(hard))
     slow = relaxing(soft, Prony(SERIES.g, (1.0, 2.0)))
     for share, ending in ((0.95, "finished"), (1.2, "diverged")):
         dt = share * limits[0]

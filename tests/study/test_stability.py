@@ -13,6 +13,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from amplification import amplification
 from scipy import sparse
 
 from validate.engine.cell import Plan, Record, Where
@@ -25,7 +26,6 @@ from validate.pipeline.experiment.find import find
 from validate.pipeline.ladder.ladder import StabilityBody, squeezed
 from validate.pipeline.run.job import Job
 from validate.report.stored.store import schema
-from validate.solve.amplification import amplification
 from validate.solve.dynamic.newmark import Newmark, misprint_limit
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.explicit.linear import ExplicitLinear

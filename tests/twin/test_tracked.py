@@ -19,15 +19,7 @@ from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.march import march
 from validate.solve.types import Outcome
-from validate.twin.tracker import (
-    Camera,
-    Origin,
-    Points,
-    Reading,
-    points_of,
-    record_tracked,
-    require_noise,
-)
+from validate.twin.tracker import Camera, Origin, Points, Reading, points_of, require_noise
 
 MESH = box((0.1, 0.1, 0.1), (3, 3, 3))
 SIDE = 0.1
@@ -50,7 +42,7 @@ def points(nt: int = 400) -> Points:
 
 def made(camera: Camera, at: Points | None = None) -> Recording:
     at = at or points()
-    return record_tracked(ORIGIN, at, FIXED, camera, {FORCE: Reading(at.t / 0.8, "N", 0.01)})
+    return ORIGIN.record(at, FIXED, camera, {FORCE: Reading(at.t / 0.8, "N", 0.01)})
 
 
 def displacement(recording: Recording, name: str) -> Floats:
@@ -93,8 +85,8 @@ def test_noise_is_as_declared_and_the_still_first_sample_ten_times_quieter() -> 
 
 
 def _first_noise(seed: int) -> Floats:
-    told = record_tracked(replace(ORIGIN, seed=seed), points(3), FIXED, Camera(2e-5), {})
-    exact = record_tracked(replace(ORIGIN, seed=seed), points(3), FIXED, Camera(0.0), {})
+    told = replace(ORIGIN, seed=seed).record(points(3), FIXED, Camera(2e-5), {})
+    exact = replace(ORIGIN, seed=seed).record(points(3), FIXED, Camera(0.0), {})
     noise = told.markers["markers"].x[0] - exact.markers["markers"].x[0]
     return np.asarray(noise.ravel())
 
@@ -112,7 +104,7 @@ def test_streams_are_apart_and_seeded() -> None:
     assert np.array_equal(one.signals[FORCE].y, other.signals[FORCE].y)
     seen = np.isfinite(other.markers["markers"].x)
     assert np.array_equal(one.markers["markers"].x[seen], other.markers["markers"].x[seen])
-    again = record_tracked(replace(ORIGIN, seed=8), points(), FIXED, Camera(1e-5), {})
+    again = replace(ORIGIN, seed=8).record(points(), FIXED, Camera(1e-5), {})
     assert not np.array_equal(again.markers["markers"].x, one.markers["markers"].x)
 
 
@@ -174,7 +166,7 @@ def test_a_planar_set_is_placed_by_its_up() -> None:
     }
     flat = {k: np.array([*p, 0.1]) for k, p in flat.items()}
     at = replace(points(), names=("B",), rest=REST[1:], u=points().u[:, 1:])
-    recording = record_tracked(ORIGIN, at, flat, Camera(0.0), {})
+    recording = ORIGIN.record(at, flat, Camera(0.0), {})
     seen = MarkerObservation.placed(recording, MESH)
     assert seen.x[200, 0] - seen.rest[0] == pytest.approx(at.u[199, 0], abs=1e-14)
     down = {"up": " ".join(str(-float(v)) for v in recording.record("camera")["up"].split())}
@@ -194,9 +186,9 @@ def test_settings_that_mean_nothing_are_refused(settings: dict[str, float]) -> N
 
 def test_clashes_and_wrong_lengths_are_refused() -> None:
     with pytest.raises(RecordingError, match=r"\['A'\] are both"):
-        record_tracked(ORIGIN, points(), {"A": REST[0]}, Camera(0.0), {})
+        ORIGIN.record(points(), {"A": REST[0]}, Camera(0.0), {})
     with pytest.raises(RecordingError, match=r"'force': shape \(3,\), expected \(400\)"):
-        record_tracked(ORIGIN, points(), FIXED, Camera(0.0), {FORCE: Reading(np.zeros(3), "N")})
+        ORIGIN.record(points(), FIXED, Camera(0.0), {FORCE: Reading(np.zeros(3), "N")})
 
 
 def test_records_that_are_no_vectors_are_refused() -> None:

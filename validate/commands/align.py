@@ -12,12 +12,7 @@ from validate.commands.display import say
 from validate.commands.recordings import written
 from validate.errors import RecordingError, UsageError
 from validate.places import try_file
-from validate.recording.clocks.alignment import (
-    MIN_CORRELATION,
-    Offset,
-    correlation_at,
-    offset_by_correlation,
-)
+from validate.recording.clocks.alignment import MIN_CORRELATION, Offset, correlation_at
 from validate.recording.clocks.events import channel, offset_by_event
 from validate.recording.mcap.write import write_recording
 from validate.recording.merge import (
@@ -148,7 +143,7 @@ def _offset(reference: Signal, stream: Signal, wanted: HowAligned) -> Offset:
         return offset_by_event(reference, stream, wanted.event, min_coverage=wanted.coverage)
     longest = float(max(np.ptp(reference.t), np.ptp(stream.t)))
     within = wanted.within or longest
-    return offset_by_correlation(reference, stream, within, wanted.coverage, wanted.correlation)
+    return Offset.by_correlation(reference, stream, within, wanted.coverage, wanted.correlation)
 
 
 def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:

@@ -26,7 +26,7 @@ from validate.register.tools.image_plane import (
     image_plane,
     pivot,
 )
-from validate.register.tools.landmarks import dwells
+from validate.register.tools.landmarks import Dwell
 
 _GROSS = 0.05  # of the image's diagonal: what marking by hand never misses by
 _LARGEST = 5e-3  # m: no scanner's or camera's pixel on tissue is wider
@@ -178,7 +178,7 @@ def _points(t: Floats, R: Floats, T: Floats, rough: str) -> tuple[Ints, Ints]:
     if not rough:
         return np.arange(len(t)), np.zeros(len(t), dtype=np.int64)
     tip = tip_offset(rough)
-    parts = dwells(t, R @ tip + T, RADIUS, LEAST)
+    parts = Dwell.of_path(t, R @ tip + T, RADIUS, LEAST)
     if not parts:
         raise UsageError(
             f"the tip never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s; check --tip"

@@ -6,7 +6,7 @@ from typing import Any
 
 from validate.commands.display import relative, say, table
 from validate.commands.progress import progress
-from validate.datasets.home import DataSet, cache_folder, data_sets, named, searched, whole
+from validate.datasets.home import DataSet, cache_folder, data_set_of, data_sets, searched, whole
 from validate.errors import RecordingError
 
 
@@ -25,7 +25,7 @@ def show(as_json: bool) -> None:
 
 def get(name: str) -> None:
     """Brings a data set into the cache, unless it is here already; says what to cite."""
-    data_set = named(name)
+    data_set = data_set_of(name)
     if here := _where(data_set):
         say(f"{data_set.name} is already here: {relative(here / data_set.folder)}", indent="  ")
     elif data_set.brought:

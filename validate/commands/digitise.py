@@ -24,7 +24,7 @@ from validate.recording.motion_capture.poses import TRANSLATION
 from validate.recording.readers import read_recording
 from validate.recording.types import Markers, Recording
 from validate.register.tools.image_plane import KnownTarget
-from validate.register.tools.landmarks import Digitised, Dwell, dwells, match_landmarks, sd_of_mean
+from validate.register.tools.landmarks import Digitised, Dwell, sd_of_mean
 from validate.units import in_si
 
 # --- Tables that were marked by hand, and known places: landmarks, and wires by two places.
@@ -169,7 +169,7 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
     recording = read_recording(file)
     t, R, T, frame = in_reference(recording, how.tool, how.reference)
     x = R @ tip_offset(how.tip) + T
-    standing = dwells(t, x, RADIUS, LEAST)
+    standing = Dwell.of_path(t, x, RADIUS, LEAST)
     if not standing:
         raise UsageError(
             f"the tip of '{how.tool}' never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s: "
@@ -260,9 +260,8 @@ def _named(
             f"points"
         )
     names, body = tuple(k.name for k in known), np.array([k.place for k in known])
-    match = match_landmarks(body, np.array([d.centre for d in parts]), _MATCH)
-    used, whole = (tuple(group[i] for i in match.seen) for group in (parts, standing))
-    found = Digitised(*path, standing, parts, names, body, match, sd_of_mean(used, whole))
+    found = Digitised.of(*path, standing, parts, names, body, _MATCH)
+    whole = tuple(standing[i] for i in found.match.seen)
     off, left = (np.linalg.norm(v, axis=1) for v in (found.residuals, found.left_out))
     rows = [
         [name, *_shown(x, d), f"{1e3 * a:.3g}", f"{1e3 * b:.3g}"]

@@ -83,7 +83,7 @@ def run(
 
 def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun:
     if listen is None:
-        return live(made.stepper, made.path, seconds)
+        return made.path.live(made.stepper, seconds)
     with closing(Listener(*made.reach, made.stepper.rate, listen)) as source:
         host, port = source.address
         complain(f"listens on {host} port {port} (UDP), see docs/how-to/live.md; Ctrl-C ends it")

@@ -25,7 +25,6 @@ from validate.recording.readers import read_recording
 from validate.recording.types import Contours, Frames, Recording
 from validate.report.charts.style import png
 from validate.report.scenes.outline_images import PlaceSaid, outlines_over
-from validate.report.sections.observations import Held
 from validate.units import in_si, split
 
 _SHOWN = 6  # images of the picture
@@ -181,10 +180,10 @@ def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[Place
     """Up to six images, evenly, with their outlines; in the first one what was said of the place
     and what else might be meant."""
     at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
-    holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
+    instants = [(f"outline {i}", float(contours.t[i])) for i in at]
     try:
         _, picture = outlines_over(
-            frames, contours, holds, "evenly spaced in time", "", marks=marks
+            frames, contours, instants, "evenly spaced in time", "", marks=marks
         )
         file.write_bytes(png(picture))
     except OSError as error:

@@ -13,7 +13,7 @@ from validate.errors import UsageError
 from validate.files import member, members
 from validate.identify.budget import averaged, labels_of
 from validate.places import try_file
-from validate.recording.clocks.alignment import declared_offset, shift
+from validate.recording.clocks.alignment import declared_offset
 from validate.recording.images.image import AS_IT_IS
 from validate.recording.mcap.read import recover
 from validate.recording.mcap.write import write_recording
@@ -128,7 +128,7 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
     merged = merge([read_recording(f) for f in files], out.stem)
     require_chain(merged)
     for topic, text in pairs(shifts, "--shift").items():
-        merged = shift(merged, topic, declared_offset(merged, topic, *_seconds(topic, text)))
+        merged = declared_offset(merged, topic, *_seconds(topic, text)).shift(merged, topic)
     write_recording(merged, out)
     written(merged, out)
     if not shifts and len(files) > 1:

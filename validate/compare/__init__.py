@@ -30,7 +30,7 @@ _HOMES = {
         "Joint",
         "Sensor",
     ),
-    "shapes.two_fields": ("compare_fields",),
+    "shapes.two_fields": ("FieldScores",),
     "force_error": ("ForcePair",),
     "shapes.pair": ("outline_boundary",),
     "shapes.shape_error": ("Boundaries",),

@@ -10,7 +10,7 @@ _HOMES = {
         "cache_folder",
         "data_path",
         "data_sets",
-        "named",
+        "data_set_of",
         "searched",
         "sought",
     ),

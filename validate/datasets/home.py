@@ -76,7 +76,7 @@ def data_sets() -> tuple[DataSet, ...]:
     )
 
 
-def named(name: str) -> DataSet:
+def data_set_of(name: str) -> DataSet:
     """The data set of that name or folder; `UsageError` naming the nearest where there is none."""
     plain = name.strip("/").replace("_", "-")
     for found in data_sets():
@@ -109,7 +109,7 @@ def data_path(
         return given
     path = sought(folder, name, beside)
     if path is None:
-        theirs = named(folder)
+        theirs = data_set_of(folder)
         what = f"{folder}/{name}" if name else f"{folder}/"
         by = by or ("recording" if name else "data")
         brings = f"`validate data get {theirs.name}` downloads it"
@@ -161,5 +161,5 @@ def _has(place: Path, folder: str, name: str | None) -> bool:
     if place != cache_folder():
         path = place / folder
         return (path / name).is_file() if name else path.is_dir() and any(path.iterdir())
-    files = [f for f in named(folder).files if name in (None, f.name)]
+    files = [f for f in data_set_of(folder).files if name in (None, f.name)]
     return bool(files) and all(whole(place / folder / f.name, f) for f in files)

@@ -6,7 +6,7 @@ _HOMES = {
     "system": ("Responses", "System", "build"),
     "assembly.assemble": ("mass", "stiffness"),
     "laws.law": ("Law", "law_of"),
-    "critical": ("CriticalStep", "critical_step", "Modes"),
+    "critical": ("CriticalStep", "Modes"),
     "assembly.locate": ("Rows",),
 }
 

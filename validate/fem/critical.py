@@ -9,6 +9,7 @@ Departures: paper 003 trusts eq 16, which is no bound: on a regular mesh it allo
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy import sparse
@@ -67,71 +68,73 @@ class CriticalStep:
         """The cell that limits the step, for messages."""
         return f"cell {self.cell} (altitude {1e3 * self.altitude:.3g} mm) limits it"
 
+    @classmethod
+    def of(cls, system: System, *, products: int = PRODUCTS, margin: float = MARGIN) -> Self:
+        """All limits of a system at rest, by its K and lumped masses, a viscoelastic one all taut.
 
-def critical_step(
-    system: System, *, products: int = PRODUCTS, margin: float = MARGIN
-) -> CriticalStep:
-    """All limits of a system at rest, by its K and lumped masses, a viscoelastic one all taut.
-
-    Raises `SceneError` for a missing density or settings out of range.
-    """
-    if any(m.prony.g for m in system.scene.materials):
-        system = build(taut(system.scene))
-    scene, free = system.scene, system.free
-    K, masses = sparse.csr_array(system.K[free][:, free]), system.masses[free]
-    found = lanczos_step(lambda x: K @ x, masses, products=products, margin=margin)
-    altitudes, c = cell_altitudes(scene), wave_speeds(scene)
-    linear = scene.mesh.order == 1
-    squares = element_frequencies(scene) ** 2 if linear else (c / altitudes) ** 2
-    worst = int(np.argmax(squares))
-    return CriticalStep(
-        found.limit,
-        found.safe,
-        gershgorin_step(K, masses),
-        2 / float(np.sqrt(squares[worst])) if linear else None,
-        float((altitudes / c).min()),
-        float((shortest_edges(scene) / c).min()),
-        worst,
-        float(altitudes[worst]),
-        found.products,
-    )
-
-
-def lanczos_step(
-    apply: MatVec, masses: Floats, *, products: int = PRODUCTS, margin: float = MARGIN
-) -> LanczosStep:
-    """2/omega_max of M^-1 K from products K x alone, x (m,), with diagonal masses (m,) kg.
-
-    For a tangent at a deformed state as well. A negative tangent eigenvalue does not disturb it.
-    Raises `SceneError` for fewer than 15 products or a margin outside 0..0.5.
-    """
-    if products < _FEWEST or not 0 <= margin <= 0.5:
-        raise SceneError(
-            f"{products} products, margin {margin:g}: expected at least {_FEWEST} products "
-            "(fewer overestimate the step) and a margin in 0..0.5"
+        Raises `SceneError` for a missing density or settings out of range.
+        """
+        if any(m.prony.g for m in system.scene.materials):
+            system = build(taut(system.scene))
+        scene, free = system.scene, system.free
+        K, masses = sparse.csr_array(system.K[free][:, free]), system.masses[free]
+        found = cls.by_lanczos(lambda x: K @ x, masses, products=products, margin=margin)
+        altitudes, c = cell_altitudes(scene), wave_speeds(scene)
+        linear = scene.mesh.order == 1
+        squares = element_frequencies(scene) ** 2 if linear else (c / altitudes) ** 2
+        worst = int(np.argmax(squares))
+        return cls(
+            found.limit,
+            found.safe,
+            gershgorin_step(K, masses),
+            2 / float(np.sqrt(squares[worst])) if linear else None,
+            float((altitudes / c).min()),
+            float((shortest_edges(scene) / c).min()),
+            worst,
+            float(altitudes[worst]),
+            found.products,
         )
-    # Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done
-    scale = 1 / np.sqrt(masses)
-    m = len(scale)
-    q = np.random.default_rng(0).standard_normal(m)
-    basis = np.zeros((min(products, m) + 1, m))
-    basis[0] = q / np.linalg.norm(q)
-    alphas: list[float] = []
-    betas: list[float] = []
-    for k in range(min(products, m)):
-        w = scale * apply(scale * basis[k])
-        alphas.append(float(basis[k] @ w))
-        for _ in range(2):  # full orthogonalisation, twice: no ghosts
-            w = w - basis[: k + 1].T @ (basis[: k + 1] @ w)
-        betas.append(float(np.linalg.norm(w)))
-        if betas[-1] <= 1e-12 * max(map(abs, alphas)):
-            break
-        basis[k + 1] = w / betas[-1]
-    T = np.diag(alphas) + np.diag(betas[:-1], 1) + np.diag(betas[:-1], -1)
-    values, vectors = np.linalg.eigh(T)
-    top, open_part, done = float(values[-1]), betas[-1] * abs(float(vectors[-1, -1])), len(alphas)
-    limit = 2 / float(np.sqrt(top))
-    return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
+
+    @staticmethod
+    def by_lanczos(
+        apply: MatVec, masses: Floats, *, products: int = PRODUCTS, margin: float = MARGIN
+    ) -> LanczosStep:
+        """2/omega_max of M^-1 K from products K x alone, x (m,), with diagonal masses (m,) kg.
+
+        For a tangent at a deformed state as well. A negative tangent eigenvalue does not disturb
+        it. Raises `SceneError` for fewer than 15 products or a margin outside 0..0.5.
+        """
+        if products < _FEWEST or not 0 <= margin <= 0.5:
+            raise SceneError(
+                f"{products} products, margin {margin:g}: expected at least {_FEWEST} products "
+                "(fewer overestimate the step) and a margin in 0..0.5"
+            )
+        # Largest Ritz value 1/s^2 of scale K scale, its residual, and the products done
+        scale = 1 / np.sqrt(masses)
+        m = len(scale)
+        q = np.random.default_rng(0).standard_normal(m)
+        basis = np.zeros((min(products, m) + 1, m))
+        basis[0] = q / np.linalg.norm(q)
+        alphas: list[float] = []
+        betas: list[float] = []
+        for k in range(min(products, m)):
+            w = scale * apply(scale * basis[k])
+            alphas.append(float(basis[k] @ w))
+            for _ in range(2):  # full orthogonalisation, twice: no ghosts
+                w = w - basis[: k + 1].T @ (basis[: k + 1] @ w)
+            betas.append(float(np.linalg.norm(w)))
+            if betas[-1] <= 1e-12 * max(map(abs, alphas)):
+                break
+            basis[k + 1] = w / betas[-1]
+        T = np.diag(alphas) + np.diag(betas[:-1], 1) + np.diag(betas[:-1], -1)
+        values, vectors = np.linalg.eigh(T)
+        top, open_part, done = (
+            float(values[-1]),
+            betas[-1] * abs(float(vectors[-1, -1])),
+            len(alphas),
+        )
+        limit = 2 / float(np.sqrt(top))
+        return LanczosStep(limit, (1 - margin) * 2 / float(np.sqrt(top + open_part)), done)
 
 
 def gershgorin_step(K: sparse.csr_array, masses: Floats) -> float:

@@ -73,20 +73,20 @@ class Ringing:
             w / (2 * np.pi), sd_w / (2 * np.pi), d / whole, sd_d / whole, w * t[-1] / (2 * np.pi)
         )
 
-
-def spectrum(t: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Frequencies (nf,) Hz and amplitudes (nf,) in y's unit of y (nt,) less its parabola, under
-    Hann's window, on the mean step of t."""
-    z = y - np.polyval(np.polyfit(t, y, 2), t)
-    window = np.hanning(len(z))
-    n = _RING_PADDED * len(z)
-    step = float(np.diff(t).mean())
-    amplitude = 2 * np.abs(np.fft.rfft(window * z, n)) / window.sum()
-    return np.asarray(np.fft.rfftfreq(n, step)), np.asarray(amplitude, dtype=np.float64)
+    @staticmethod
+    def spectrum(t: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Frequencies (nf,) Hz and amplitudes (nf,) in y's unit of y (nt,) less its parabola, under
+        Hann's window, on the mean step of t."""
+        z = y - np.polyval(np.polyfit(t, y, 2), t)
+        window = np.hanning(len(z))
+        n = _RING_PADDED * len(z)
+        step = float(np.diff(t).mean())
+        amplitude = 2 * np.abs(np.fft.rfft(window * z, n)) / window.sum()
+        return np.asarray(np.fft.rfftfreq(n, step)), np.asarray(amplitude, dtype=np.float64)
 
 
 def _peak(t: Floats, y: Floats) -> float:
-    f, amplitude = spectrum(t, y)
+    f, amplitude = Ringing.spectrum(t, y)
     return float(f[amplitude.argmax()])
 
 
@@ -251,7 +251,7 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
     if len(t) < _FEWEST:
         frequency, resolution = 0.0, 0.0
     else:
-        f, amplitude = spectrum(*_even(t, y))
+        f, amplitude = Ringing.spectrum(*_even(t, y))
         frequency, resolution = float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
     coarse = noise > 0 and frequency * usual * _SMOOTH > 1
     found, rings = noise if coarse else max(noise, _noise(y)), _ringing(t, y)

@@ -10,8 +10,8 @@ _HOMES = {
     "reader": ("Reader",),
     "readers": ("READERS", "read_recording"),
     "mcap.write": ("write_recording",),
-    "preflight": ("Inspection", "inspect_recording"),
-    "clocks.alignment": ("Offset", "offset_by_correlation", "shift"),
+    "preflight": ("Inspection",),
+    "clocks.alignment": ("Offset",),
     "clocks.events": ("offset_by_event",),
 }
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from validate.errors import RecordingError
-from validate.recording.clocks.alignment import Offset, moved, offset_near, shift
+from validate.recording.clocks.alignment import Offset, moved, offset_near
 from validate.recording.types import Record, Recording, Signal, Source, by_kind
 
 REPEATS = "repeats"  # a record: logs, specimens, share
@@ -181,7 +181,7 @@ def together(reference: Recording, others: Sequence[Moved], name: str) -> Record
     found = merge([reference, *(replace(r, t0_ns=reference.t0_ns) for r in straight)], name)
     for one in others:
         for topic in one.recording.streams:
-            found = shift(found, topic, one.offset)
+            found = one.offset.shift(found, topic)
     drifts = {
         f"clock_drift/{one.recording.name}": {
             "rate": repr(d.rate), "sd": repr(d.sd), "about_s": repr(d.middle),

@@ -90,6 +90,61 @@ class Inspection:
             plain[name] = list(plain[name])
         return plain
 
+    @classmethod
+    def of(cls, path: Path | str) -> "Inspection":
+        """Inspect any MCAP file; raises `RecordingError` for one that is damaged or no MCAP.
+
+        A file that stops short is inspected as far as it is whole.
+
+        The error counts the chunks and messages that can be read before the damage.
+        """
+        path = Path(path)
+        seen = AllSeen()
+        with opened(path) as stream:
+            try:
+                verified = verify(stream, path, seen, cut=True)
+            except RecordingError as error:
+                raise no_mcap(path, error) from None
+            # Channels without messages, and images whose calibration came after them.
+            late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
+            seen.channels.update(
+                {n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()}
+            )
+            for message in messages_of(stream, verified, late.keys()):
+                seen.take(message.channel_id, [message.data])
+        found: list[str] = []
+        if (cut := verified.cut) is not None:
+            what = "the file, behind its data," if cut.ended else "the data section"
+            found.append(
+                f"no end of {what}: complete up to byte {cut.at} of {verified.source.bytes}, "
+                f"{verified.messages} messages; the writer was stopped; save them with `validate "
+                f"import {verified.source.path} --recover -o X.mcap`"
+            )
+        if verified.claimed_messages not in (None, verified.messages):
+            found.append(
+                f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
+            )
+        if verified.misindexed:
+            found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
+        if verified.unknown_records:
+            found.append(f"{verified.unknown_records} records of unknown kind")
+        often = Counter(c.topic for c in verified.channels.values())
+        found += [f"{topic!r} is on {n} channels" for topic, n in often.items() if n > 1]
+        for number, channel in verified.channels.items():
+            schema = verified.schemas.get(channel.schema_id)
+            if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
+                found.append(
+                    f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'"
+                )
+        names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
+        found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
+        if seen.limit:
+            found.append(seen.limit)
+        topics = [
+            _topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()
+        ]
+        return _inspection(verified, topics, [*found, *_chained(path, verified)])
+
 
 def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
     """Inspect a file of any format, of the `kind` that it shows where none is said.
@@ -99,7 +154,7 @@ def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
     reader = named(kind) if kind else recognised(path)
     if reader is MCAP:
         require_known(options, ())
-        return inspect_recording(path)
+        return Inspection.of(path)
     try:
         recording = reader.read(path, options)
     except UsageError as asks:
@@ -158,57 +213,6 @@ def _stream_topic(name: str, recording: Recording) -> tuple[Topic, list[str]]:
 
 def _unread_topic(name: str, why: str) -> Topic:
     return Topic(name, f"not read: {why}", "", "", "", 0, None, None, "", "", None)
-
-
-def inspect_recording(path: Path | str) -> Inspection:
-    """Inspect any MCAP file; raises `RecordingError` for one that is damaged or no MCAP.
-
-    A file that stops short is inspected as far as it is whole.
-
-    The error counts the chunks and messages that can be read before the damage.
-    """
-    path = Path(path)
-    seen = AllSeen()
-    with opened(path) as stream:
-        try:
-            verified = verify(stream, path, seen, cut=True)
-        except RecordingError as error:
-            raise no_mcap(path, error) from None
-        # Channels without messages, and images whose calibration came after them.
-        late = {n: c for n, c in our_channels(verified).items() if n not in seen.channels}
-        seen.channels.update(
-            {n: ChannelSeen(channel, schema) for n, (channel, schema) in late.items()}
-        )
-        for message in messages_of(stream, verified, late.keys()):
-            seen.take(message.channel_id, [message.data])
-    found: list[str] = []
-    if (cut := verified.cut) is not None:
-        what = "the file, behind its data," if cut.ended else "the data section"
-        found.append(
-            f"no end of {what}: complete up to byte {cut.at} of {verified.source.bytes}, "
-            f"{verified.messages} messages; the writer was stopped; save them with `validate "
-            f"import {verified.source.path} --recover -o X.mcap`"
-        )
-    if verified.claimed_messages not in (None, verified.messages):
-        found.append(
-            f"statistics claim {verified.claimed_messages} messages, {verified.messages} found"
-        )
-    if verified.misindexed:
-        found.append(f"{verified.misindexed} chunks are indexed wrongly or not at all")
-    if verified.unknown_records:
-        found.append(f"{verified.unknown_records} records of unknown kind")
-    often = Counter(c.topic for c in verified.channels.values())
-    found += [f"{topic!r} is on {n} channels" for topic, n in often.items() if n > 1]
-    for number, channel in verified.channels.items():
-        schema = verified.schemas.get(channel.schema_id)
-        if schema is not None and schema.name == IMAGE and number not in our_channels(verified):
-            found.append(f"{channel.topic!r}: images without record '{CALIBRATION}{channel.topic}'")
-    names = Counter(m.name for m in verified.metadata if m.name != _OFTEN)
-    found += [f"metadata {name!r} occurs {n} times" for name, n in names.items() if n > 1]
-    if seen.limit:
-        found.append(seen.limit)
-    topics = [_topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()]
-    return _inspection(verified, topics, [*found, *_chained(path, verified)])
 
 
 def _chained(path: Path, verified: Verified) -> list[str]:

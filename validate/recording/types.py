@@ -74,6 +74,7 @@ def tree_of(streams: Mapping[str, "DataArray"], name: str, facts: Mapping[str, A
 # -------------------------------------------------------------------------------------------------
 
 Record = Mapping[str, str]
+MADE_WITH = "made_with"  # the record of a twin's parameters
 T = TypeVar("T")
 
 
@@ -343,6 +344,11 @@ class Recording:
 
     def _repr_html_(self) -> str:
         return self._screen.html
+
+    @property
+    def made_with(self) -> Record:
+        """Parameters of the twin that made it, as text by path; none where it says none."""
+        return self.metadata.get(MADE_WITH, {})
 
     @property
     def _screen(self) -> Screen:

@@ -132,6 +132,37 @@ class Coefficients:
             if getattr(self, f.name) != getattr(known, f.name, f.default)
         ]  # fmt: skip
 
+    def lost_stability(self, law: str, mu: float) -> "Lost | None":
+        """Where stiffness is lost between the `stretches` for a law; None: nowhere. mu Pa."""
+        low, high = (np.log(s) for s in self.stretches)
+        logs = np.concatenate([np.linspace(0, end, _POINTS) for end in (low, high)])
+        lost = []
+        for mode, (first, second) in _MODES.items():
+            strains = np.multiply.outer([first, second, -first - second], logs)
+            inside = ((strains >= low - 1e-12) & (strains <= high + 1e-12)).all(axis=0)
+            # Least eigenvalue Pa of the energy's second derivatives by the logarithms a, b (n,).
+            a = first * logs
+            b = second * logs
+            if law == "ogden":
+                terms = [
+                    m / alpha * _power_sum(a, b, alpha)[2] for m, alpha in ogden_terms(self, mu)
+                ]
+                stiffness = np.asarray(np.linalg.eigvalsh(np.sum(terms, axis=0))[:, 0])
+            else:
+                (s1, g1, D1), (_, _, D2) = (_power_sum(a, b, alpha) for alpha in (2.0, -2.0))
+                C10, x = mu / 2 - self.C01, (s1 - 3)[:, None, None]
+                slope, curve = (
+                    C10 + 2 * self.C20 * x + 3 * self.C30 * x**2,
+                    2 * self.C20 + 6 * self.C30 * x,
+                )
+                H = slope * D1 + curve * g1[:, :, None] * g1[:, None, :] + self.C01 * D2
+                stiffness = np.asarray(np.linalg.eigvalsh(H)[:, 0])
+            bad = np.flatnonzero(inside & ~(stiffness > 0))
+            if len(bad):
+                worst = bad[np.argmin(np.abs(logs[bad]))]
+                lost.append(Lost(float(np.exp(logs[worst])), mode, float(stiffness[worst])))
+        return min(lost, key=lambda one: abs(np.log(one.stretch)), default=None)
+
 
 def law_kind(law: str) -> LawKind:
     """Return the law of this name; the linear one knows nothing."""
@@ -178,37 +209,10 @@ class Lost:
     stiffness: float
 
 
-def lost_stability(law: str, c: Coefficients, mu: float) -> Lost | None:
-    """Where stiffness is lost between the coefficients' `stretches`; None: nowhere. mu Pa."""
-    low, high = (np.log(s) for s in c.stretches)
-    logs = np.concatenate([np.linspace(0, end, _POINTS) for end in (low, high)])
-    lost = []
-    for mode, (first, second) in _MODES.items():
-        strains = np.multiply.outer([first, second, -first - second], logs)
-        inside = ((strains >= low - 1e-12) & (strains <= high + 1e-12)).all(axis=0)
-        # Least eigenvalue Pa of the energy's second derivatives by the logarithms a, b (n,).
-        a = first * logs
-        b = second * logs
-        if law == "ogden":
-            terms = [m / alpha * _power_sum(a, b, alpha)[2] for m, alpha in ogden_terms(c, mu)]
-            stiffness = np.asarray(np.linalg.eigvalsh(np.sum(terms, axis=0))[:, 0])
-        else:
-            (s1, g1, D1), (_, _, D2) = (_power_sum(a, b, alpha) for alpha in (2.0, -2.0))
-            C10, x = mu / 2 - c.C01, (s1 - 3)[:, None, None]
-            slope, curve = C10 + 2 * c.C20 * x + 3 * c.C30 * x**2, 2 * c.C20 + 6 * c.C30 * x
-            H = slope * D1 + curve * g1[:, :, None] * g1[:, None, :] + c.C01 * D2
-            stiffness = np.asarray(np.linalg.eigvalsh(H)[:, 0])
-        bad = np.flatnonzero(inside & ~(stiffness > 0))
-        if len(bad):
-            worst = bad[np.argmin(np.abs(logs[bad]))]
-            lost.append(Lost(float(np.exp(logs[worst])), mode, float(stiffness[worst])))
-    return min(lost, key=lambda one: abs(np.log(one.stretch)), default=None)
-
-
 def require_stable(law: str, c: Coefficients, mu: float, kappa: float) -> None:
     """Raise `SceneError` at the stretch nearest to 1 where stiffness is lost, and say in which
     stretch; mu, kappa Pa."""
-    lost = lost_stability(law, c, mu)
+    lost = c.lost_stability(law, mu)
     if lost:
         raise SceneError(
             f"law '{law}' with {_words(law, c, mu)} loses positive energy at stretch "

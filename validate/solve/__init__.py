@@ -7,7 +7,6 @@ _HOMES = {
     "handles": ("Handles", "require_handled"),
     "schemes": ("SCHEMES", "SOLVERS", "schemes_that"),
     "march": ("run_scheme",),
-    "amplification": ("Amplification",),
 }
 
 __all__ = names(_HOMES)

@@ -19,7 +19,7 @@ from validate.arrays import Floats
 from validate.fem.system import DampingTerms, MassName, System
 from validate.scene.material import LawName
 from validate.scene.mesh import Kind
-from validate.solve.dynamic.newmark_rule import Rule, RuleName, per_mode
+from validate.solve.dynamic.newmark_rule import Rule, RuleName
 from validate.solve.types import SceneSolver, Scheme
 
 # --- Maps of (q, v, a) of one mode over a step, of implicit and explicit rules, and their radii.
@@ -27,22 +27,8 @@ from validate.solve.types import SceneSolver, Scheme
 UpdateName = Literal["printed", "lagged"]
 
 
-def newmark_maps(rule: Rule, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
-    """Return the maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s, k 1/s^2
-    (r,)."""
-    h, one, zero = rule.h, np.ones_like(c), np.zeros_like(c)
-    q = np.stack(per_mode(rule, c, k)[:3], axis=-1)
-    v_old = np.stack([zero, one, zero], axis=-1)
-    a_old = np.stack([zero, zero, one], axis=-1)
-    q_old = np.stack([one, zero, zero], axis=-1)
-    v, a = rule.rates(q, q_old, v_old, a_old)
-    if misprinted:
-        q = q + h * (v - v_old)
-    return np.stack([q, v, a], axis=1)
-
-
 def explicit_maps(h: float, c: Floats, k: Floats, update: UpdateName) -> Floats:
-    """As `newmark_maps`, for the explicit schemes."""
+    """As `Rule.maps`, for the explicit schemes."""
     one, zero = np.ones_like(c), np.zeros_like(c)
     half = np.stack([zero, one, h / 2 * one], axis=-1)
     q = np.stack([one, zero, zero], axis=-1) + h * half
@@ -107,7 +93,7 @@ class Stepping:
 def implicit_maps(rule: RuleName) -> Radii:
     """Return the step map of a rule of Newmark's family."""
     unit = Rule.of(rule, 1.0)
-    return lambda r: newmark_maps(unit, r.c("full"), r.x**2)
+    return lambda r: unit.maps(r.c("full"), r.x**2)
 
 
 Rung = Literal[

@@ -11,7 +11,7 @@ from validate.recording.types import Recording
 from validate.scene.scene import Scene
 from validate.solve.march import march
 from validate.solve.types import Run, Scheme
-from validate.twin.tracker import Camera, Origin, Reading, points_of, record_tracked
+from validate.twin.tracker import Camera, Origin, Reading, points_of
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,7 @@ class SteppedTwin:
         progress("measure")
         material, flat = self.scene.material, 3 - self.scene.mesh.dimension
         stiffness = {"E_Pa": repr(material.E), "nu": repr(material.nu)}
-        return record_tracked(
-            replace(origin, declared={**origin.declared, **stiffness}),
+        return replace(origin, declared={**origin.declared, **stiffness}).record(
             points_of(run, self.scene),
             {k: np.array([*v, *[0.0] * flat]) for k, v in fiducials.items()},
             camera,

@@ -7,6 +7,7 @@ registration, and stand in the layout beside the tracked points.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -19,7 +20,6 @@ from validate.scene.scene import Scene
 from validate.solve.types import Run
 from validate.twin.sensors import signal, streams
 
-START_NS = 1_700_000_000_000_000_000  # of every tracked recording: an arbitrary round moment
 _AT_REST = 1e-12  # m, what counts as no displacement in the first sample
 
 
@@ -132,10 +132,80 @@ class Origin:
     `same_model`: the model that made it is the one it will judge (an inverse crime, to be printed).
     """
 
+    #: Of every tracked recording: an arbitrary round moment.
+    start_ns: ClassVar[int] = 1_700_000_000_000_000_000
+
     name: str
     seed: int
     same_model: bool
     declared: Record = field(default_factory=dict)
+
+    def record(
+        self,
+        points: Points,
+        fiducials: Mapping[str, Floats],
+        camera: Camera,
+        readings: Mapping[str, Reading],
+    ) -> Recording:
+        """Markers "markers" (points, then fiducials (3,) m) and a signal for every reading.
+
+        Rest at t = 0 is put in front of points that begin later (`march` gives the ends of steps);
+        readings are zero there. Signals keep every step. Records: "marker_layout" (m, the scene's
+        frame), "camera" ("up": the scene's z there), "provenance". Each sensor has its own stream.
+        Raises `RecordingError` for points displaced at t = 0, names that clash and lengths that
+        differ.
+        """
+        clash = sorted(set(points.names) & set(fiducials))
+        if clash:
+            raise RecordingError(
+                f"markers {clash} are both tracked points and fiducials; rename them"
+            )
+        lead = 1 if points.t[0] > 0 else 0
+        # The points at rest at t = 0, and the fiducials that never move
+        nt, k, f = len(points.t), len(points.names), len(fiducials)
+        u = np.zeros((nt + lead, k + f, 3))
+        u[lead:, :k] = points.u
+        fixed = np.array(list(fiducials.values())).reshape(f, 3)
+        t = np.concatenate([np.zeros(lead), points.t])
+        seen = Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
+        if np.abs(seen.u[0]).max() > _AT_REST:
+            raise RecordingError(
+                f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
+                "at t = 0 s: the registration needs the body at rest first"
+            )
+        seeds = streams(self.seed, ("markers", "missing", *readings, "odd"))
+        clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}
+        led = {}
+        for name, reading in readings.items():
+            what = f"reading '{name}'"
+            y = checked(reading.y, what, (len(seen.t) - lead,), error=RecordingError)
+            led[name] = np.concatenate([np.zeros(lead), y])
+        return Recording(
+            self.name,
+            Source(self.name, "", 0, "made in memory"),
+            self.start_ns,
+            markers={"markers": camera.looks(seen, seeds)},
+            signals={
+                k: signal(seen.t, led[k], r.unit, r.sd, "scene", seeds[k])
+                for k, r in readings.items()
+            },
+            metadata={
+                "marker_layout": {k: _text(v) for k, v in zip(seen.names, seen.rest, strict=True)},
+                "camera": {
+                    "up": _text(camera.rotation @ np.array([0.0, 0.0, 1.0])),
+                    "sd_m": repr(camera.sd),
+                    "still": str(camera.still),
+                    "missing": repr(camera.missing),
+                },
+                "provenance": {
+                    "kind": "twin",
+                    "same_model": str(self.same_model).lower(),
+                    "seed": str(self.seed),
+                    **self.declared,
+                },
+                **clock,
+            },
+        )
 
 
 def points_of(run: Run, scene: Scene) -> Points:
@@ -158,70 +228,6 @@ def points_of(run: Run, scene: Scene) -> Points:
         tuple(p.name for p in scene.probes),
         np.pad(rest, ((0, 0), (0, flat))),
         np.pad(moved, ((0, 0), (0, 0), (0, flat))),
-    )
-
-
-def record_tracked(
-    origin: Origin,
-    points: Points,
-    fiducials: Mapping[str, Floats],
-    camera: Camera,
-    readings: Mapping[str, Reading],
-) -> Recording:
-    """Markers "markers" (points, then fiducials (3,) m) and a signal for every reading.
-
-    Rest at t = 0 is put in front of points that begin later (`march` gives the ends of steps);
-    readings are zero there. Signals keep every step. Records: "marker_layout" (m, the scene's
-    frame), "camera" ("up": the scene's z there), "provenance". Each sensor has its own stream.
-    Raises `RecordingError` for points displaced at t = 0, names that clash and lengths that differ.
-    """
-    clash = sorted(set(points.names) & set(fiducials))
-    if clash:
-        raise RecordingError(f"markers {clash} are both tracked points and fiducials; rename them")
-    lead = 1 if points.t[0] > 0 else 0
-    # The points at rest at t = 0, and the fiducials that never move
-    nt, k, f = len(points.t), len(points.names), len(fiducials)
-    u = np.zeros((nt + lead, k + f, 3))
-    u[lead:, :k] = points.u
-    fixed = np.array(list(fiducials.values())).reshape(f, 3)
-    t = np.concatenate([np.zeros(lead), points.t])
-    seen = Points(t, (*points.names, *fiducials), np.vstack([points.rest, fixed]), u)
-    if np.abs(seen.u[0]).max() > _AT_REST:
-        raise RecordingError(
-            f"points are {1e3 * np.abs(seen.u[0]).max():.3g} mm away from their rest position "
-            "at t = 0 s: the registration needs the body at rest first"
-        )
-    seeds = streams(origin.seed, ("markers", "missing", *readings, "odd"))
-    clock = {f"{RECORD}markers": {"sd": repr(camera.late)}} if camera.late else {}
-    led = {}
-    for name, reading in readings.items():
-        what = f"reading '{name}'"
-        y = checked(reading.y, what, (len(seen.t) - lead,), error=RecordingError)
-        led[name] = np.concatenate([np.zeros(lead), y])
-    return Recording(
-        origin.name,
-        Source(origin.name, "", 0, "made in memory"),
-        START_NS,
-        markers={"markers": camera.looks(seen, seeds)},
-        signals={
-            k: signal(seen.t, led[k], r.unit, r.sd, "scene", seeds[k]) for k, r in readings.items()
-        },
-        metadata={
-            "marker_layout": {k: _text(v) for k, v in zip(seen.names, seen.rest, strict=True)},
-            "camera": {
-                "up": _text(camera.rotation @ np.array([0.0, 0.0, 1.0])),
-                "sd_m": repr(camera.sd),
-                "still": str(camera.still),
-                "missing": repr(camera.missing),
-            },
-            "provenance": {
-                "kind": "twin",
-                "same_model": str(origin.same_model).lower(),
-                "seed": str(origin.seed),
-                **origin.declared,
-            },
-            **clock,
-        },
     )
 
 

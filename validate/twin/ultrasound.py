@@ -35,6 +35,10 @@ class Scanner:
     dynamic_range: float = quantity(60.0, "dB", "black to white")
     noise: float = quantity(-45.0, "dB", "electronic noise relative to tissue at the probe")
 
+    def b_mode(self, target: "Target", rng: np.random.Generator) -> NDArray[np.uint8]:
+        """Return the log-compressed image (height, width), 8 bits."""
+        return compressed(self, envelope(self, target, rng))
+
 
 @dataclass(frozen=True)
 class Target:
@@ -56,11 +60,6 @@ class Target:
     second_level: float = quantity(-12.0, "dB", "echo of the second dark region")
     plate: float | None = None
     plate_level: float = quantity(20.0, "dB", "echo of the plate")
-
-
-def b_mode(scanner: Scanner, target: Target, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Return the log-compressed image (height, width), 8 bits."""
-    return compressed(scanner, envelope(scanner, target, rng))
 
 
 def envelope(scanner: Scanner, target: Target, rng: np.random.Generator) -> Floats:

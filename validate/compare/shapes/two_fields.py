@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -248,6 +249,44 @@ class FieldScores:
     scores: tuple[Score, ...]
     refused: tuple[tuple[str, str], ...]
 
+    @classmethod
+    def of(
+        cls,
+        one: Field,
+        other: Field,
+        onto: "Mesh | Scene | Common | FieldScores | None" = None,
+        metrics: Sequence[str] | None = None,
+    ) -> Self:
+        """Compare the run `one` with the reference `other`, also on different meshes, by metrics of
+        these names (none: all that exist).
+
+        Norms and E_i are taken on the mesh `onto` (default: the reference's), boundaries on each
+        field's own mesh. A scene as `onto` adds densities and the energy norms; earlier scores
+        stand for their mesh, which is then prepared once for all frames.
+        """
+        common = onto.pair.common if isinstance(onto, FieldScores) else onto
+        by_name = {m.name: m for m in METRICS_OF_FIELDS}
+        chosen = None if metrics is None else tuple(by_name[name] for name in metrics)
+        between = pair(one, other, common)
+        found = compared(between, chosen)
+        return cls(between, found.scores, found.refused)
+
+    def whole(self) -> tuple[Score, ...]:
+        """Return all scores; raises `ComparisonError` where one of the metrics does not exist, with
+        its name and the reason."""
+        if self.refused:
+            name, reason = self.refused[0]
+            raise ComparisonError(
+                f"{len(self.refused)} metrics of {self.pair.one.name} against "
+                f"{self.pair.other.name} are not defined; {name}: {reason}"
+            )
+        return self.scores
+
+    @staticmethod
+    def units(dimension: int) -> dict[str, str]:
+        """Return the unit of every metric in 2-D or 3-D, by name."""
+        return {m.name: m.unit.format(dimension=dimension) for m in METRICS_OF_FIELDS}
+
 
 def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = None) -> FieldScores:
     """Every metric that exists for the pair; the rest (0/0 at rest, crossings) by reason.
@@ -264,25 +303,3 @@ def compared(between: FieldPair, metrics: Sequence[Metric[FieldPair]] | None = N
         except ComparisonError as error:
             refused.append((metric.name, str(error)))
     return FieldScores(between, tuple(scores), tuple(refused))
-
-
-def compare_fields(
-    one: Field,
-    other: Field,
-    onto: Mesh | Scene | Common | None = None,
-    metrics: Sequence[Metric[FieldPair]] | None = None,
-) -> tuple[Score, ...]:
-    """Scores of the run `one` against the reference `other`, also on different meshes.
-
-    Norms and E_i are taken on the mesh `onto` (default: the reference's), boundaries on each
-    field's own mesh. A scene as `onto` adds densities and the energy norms.
-    Raises `ComparisonError` where one of the metrics does not exist, with its name and the reason.
-    """
-    found = compared(pair(one, other, onto), metrics)
-    if found.refused:
-        name, reason = found.refused[0]
-        raise ComparisonError(
-            f"{len(found.refused)} metrics of {one.name} against {other.name} are not defined; "
-            f"{name}: {reason}"
-        )
-    return found.scores

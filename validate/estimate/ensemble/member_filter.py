@@ -36,7 +36,7 @@ from validate.estimate.gating import (
 from validate.estimate.kalman.coordinates import OneAtATime
 from validate.estimate.kalman.formulas import Corrected, Innovation, innovation_units, nothing
 from validate.estimate.measurements import Measurements, Timetable
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.system import System
 from validate.parameters import quantity
 from validate.scene.scene import Scene
@@ -113,7 +113,7 @@ class MemberModel:
         """Return the largest step s of a member as stiff as the model; infinite where none is."""
         if system.scene.material.law == "linear" or self.beyond_limit == "run":
             return np.inf
-        return (1 - MARGIN) * critical_step(system).lanczos
+        return (1 - MARGIN) * CriticalStep.of(system).lanczos
 
 
 class Analysis(Protocol):

@@ -22,7 +22,7 @@ from validate.estimate.kalman.coordinates import OneAtATime
 from validate.estimate.kalman.formulas import Innovation, innovation_units, nothing
 from validate.estimate.measurements import Measurements, Timetable
 from validate.estimate.smoother import Look, Note, Transition, smoothed
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.large_strain.explicit import ExplicitBody, Precision
 from validate.fem.system import System
 from validate.scene.scene import Scene
@@ -109,7 +109,7 @@ def explicit_step(
 
 def beyond(system: System, h: float) -> str:
     """Why a step of h s is refused; empty where it keeps the margin below the critical one."""
-    found = critical_step(system)
+    found = CriticalStep.of(system)
     if h <= (1 - MARGIN) * found.lanczos:
         return ""
     return (

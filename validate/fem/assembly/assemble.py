@@ -403,16 +403,13 @@ def _nodal_mean_stiffness(scene: Scene) -> sparse.csr_array:
 
 def divergence(mesh: Mesh) -> tuple[sparse.csr_array, Floats]:
     """B (e, N) so that B u is the volume strain of every linear cell, and volumes (e,) m^d."""
-    return rows_of_cells(mesh, shape_gradients(mesh)), mesh.cell_volumes()
-
-
-def rows_of_cells(mesh: Mesh, values: Floats) -> sparse.csr_array:
-    """Return a row (e, N) for every cell with its corners' values (e, d + 1, d)."""
     cells, d = mesh.corners, mesh.dimension
     columns = (cells[..., None] * d + np.arange(d)).reshape(len(cells), -1)
     rows = np.repeat(np.arange(len(cells)), columns.shape[1])
     shape = (len(cells), len(mesh.nodes) * d)
-    return sparse.csr_array((values.ravel(), (rows, columns.ravel())), shape=shape)
+    values = shape_gradients(mesh).ravel()
+    B = sparse.csr_array((values, (rows, columns.ravel())), shape=shape)
+    return B, mesh.cell_volumes()
 
 
 def shape_gradients(mesh: Mesh) -> Floats:

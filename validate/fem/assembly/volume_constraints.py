@@ -1,4 +1,4 @@
-"""Volume constraints: Taylor-Hood elements, exact volume at nu = 0.5, a volume penalty.
+"""Volume constraints: Taylor-Hood elements, and exact volume at nu = 0.5.
 
 Taylor-Hood elements (displacements quadratic, pressure linear) are a locking-free reference.
 Find u, p: 2 mu (e(u), e(v)) - (p, div v) = f(v), (div u, q) + (p/lambda, q) = 0; stable and of
@@ -11,24 +11,10 @@ volume strain (`fem.assembly.assemble`). K holds a and a finite penalty r theta^
 iteration adds r theta to p (Uzawa's, on the penalised problem: Fortin & Glowinski 1983, ch. 1). The
 error shrinks by about mu / r an iteration, so that the limit is that of the saddle system and of
 the penalty in nothing.
-
-The penalty acts along the face normals of every cell: Picinbono, Delingette & Ayache (2001), as
-paper 002 tells it (section VI.B): a low Poisson ratio, and at each node of an element a force along
-the normal of the opposite face that resists a change of the element's volume. With the volume
-strain theta of a cell, its slopes g_a = -A_a n_a / (d V) (area and outward normal of the face
-opposite to node a) and a weight k Pa there are two readings:
-
-- area-weighted normals, f_a = -k V theta g_a: the gradient of the energy k V theta^2 / 2, and so
-  exactly a Lame constant lambda that is raised by k;
-- unit normals, f_a = -k V theta s g_a/|g_a|, s the mean of the |g_a|: all nodes of a cell are
-  pushed alike. The forces of a cell that is not regular then neither add up to zero nor come from
-  an energy: the matrix is not symmetric, and the body gains momentum and energy from nothing.
-
-Departures: paper 002 prints no law; the force is linear in theta, as the rest of its model is.
 """
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -54,12 +40,9 @@ from skfem.helpers import ddot, div, sym_grad
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import (
-    divergence,
     lame_constants,
     library_mesh,
     mean_divergence,
-    rows_of_cells,
-    shape_gradients,
 )
 from validate.fem.linear_solvers.factor import Factor, Fronts
 from validate.fem.system import System
@@ -225,35 +208,3 @@ def keep_volumes(
         f"after {_ITERATIONS} iterations; the held and driven nodes allow no motion of "
         "constant volume: free a face, or use nu <= 0.4999"
     )
-
-
-Normals = Literal["area", "unit"]
-
-
-def volume_penalty(scene: Scene, weight: float, normals: Normals = "area") -> sparse.csr_array:
-    """P (N, N) N/m: the penalty's forces on the nodes are -P u. `weight` is k in Pa.
-
-    Raises `SceneError` for a negative weight, plane stress, whose cells may thin out, and cells
-    other than linear simplices.
-    """
-    if not (np.isfinite(weight) and weight >= 0):
-        raise SceneError(f"penalty of {weight:g} Pa on a change of volume: expected at least 0")
-    if scene.plane == "stress":
-        raise SceneError(
-            "in plane stress the thickness is free: use the penalty in plane strain or 3-D"
-        )
-    if scene.mesh.order != 1:
-        raise SceneError(
-            f"a penalty along face normals supports linear cells, not {scene.mesh.kind}"
-        )
-    B, volumes = divergence(scene.mesh)
-    scale = sparse.diags_array(scene.thickness * weight * volumes)
-    along = B if normals == "area" else _unit_rows(scene)
-    return sparse.csr_array(along.T @ scale @ B)
-
-
-def _unit_rows(scene: Scene) -> sparse.csr_array:
-    """Rows (e, N) of the inward normals, all as long as the mean slope of their cell, 1/m."""
-    slopes = shape_gradients(scene.mesh)
-    lengths: Floats = np.linalg.norm(slopes, axis=2, keepdims=True)
-    return rows_of_cells(scene.mesh, slopes / lengths * lengths.mean(axis=1, keepdims=True))

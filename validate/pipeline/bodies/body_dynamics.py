@@ -28,9 +28,9 @@ from validate.estimate.reduced.reduced_kf import ReducedKf
 from validate.identify.recorded_motion import (
     FRACTION,
     RecordedMotion,
+    Ringing,
     motion_of,
     recorded_motion,
-    spectrum,
 )
 from validate.numbers import scale, shown_unit
 from validate.pipeline.bodies.choices import SeenOf
@@ -159,7 +159,7 @@ def _spectrum(shown: RecordedMotion) -> tuple[Chart, ...]:
         return ()
     size, unit = scale(shown.unit), shown_unit(shown.unit)
     t = np.linspace(shown.t[0], shown.t[-1], len(shown.t))
-    f, amplitude = spectrum(t, np.interp(t, shown.t, shown.y))
+    f, amplitude = Ringing.spectrum(t, np.interp(t, shown.t, shown.y))
     last = f <= max(10 * shown.frequency, 10 * shown.resolution)
     return (Chart("recorded_spectrum", f"Spectrum of '{shown.marker}'", "frequency / Hz",
                   f"amplitude / {unit}", (Series("measured", f[last], size * amplitude[last]),),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields, replace
 from inspect import signature
-from typing import Any, Protocol, cast, runtime_checkable
+from typing import Any, ClassVar, Protocol, cast, runtime_checkable
 
 from validate.errors import UsageError
 from validate.estimate.measurements import Measurements
@@ -15,7 +15,6 @@ from validate.scene.scene import Scene
 from validate.solve.types import Stepper
 
 # Filters whose loads walk: the history of their defaults does not say what they were chosen on.
-WALK_UNRECORDED = "the run does not record whether the load's walk was chosen on this twin"
 
 
 @runtime_checkable
@@ -37,6 +36,11 @@ class Method:
     which settings were chosen on the very twin that judges the method, so that its verdict is shown
     with that beside.
     """
+
+    #: `chosen` of a filter of whose load's walk nobody wrote down how it was chosen.
+    walk_unrecorded: ClassVar[str] = (
+        "the run does not record whether the load's walk was chosen on this twin"
+    )
 
     label: str = quantity("", "1", "name in reports")
     settings: Any = part(None, "of the scheme or filter")

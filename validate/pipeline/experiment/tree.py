@@ -16,8 +16,7 @@ from validate.files import modified
 from validate.parameters import describe, part, quantity, value_at, with_given
 from validate.pipeline.experiment.variation import change_of
 from validate.recording.types import Recording
-from validate.register.registration import Registered
-from validate.register.scene_registration import as_declared
+from validate.register.registration import Registered, as_declared
 from validate.scene.geometries.refinement import size_against
 from validate.scene.geometries.specification import Geometry, MeshFile, cell_size
 from validate.scene.laws import Coefficients

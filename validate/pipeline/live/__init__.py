@@ -2,11 +2,10 @@
 
 from validate.pipeline.live.clock import LiveRun, live, realtime
 from validate.pipeline.live.listener import Listener
-from validate.pipeline.live.live_recording import LIVE, as_given, written
-from validate.pipeline.live.preparation import Prepared, RecordedPath, prepared, recorded_tip
+from validate.pipeline.live.live_recording import as_given, written
+from validate.pipeline.live.preparation import Prepared, RecordedPath, prepared
 
 __all__ = [
-    "LIVE",
     "Listener",
     "LiveRun",
     "Prepared",
@@ -15,6 +14,5 @@ __all__ = [
     "live",
     "prepared",
     "realtime",
-    "recorded_tip",
     "written",
 ]

@@ -63,11 +63,14 @@ def _from_rest(done: LiveRun, rest: Floats) -> tuple[Floats, Floats, Floats]:
 _SAME = 1e-9  # N: a replay of a live loop is the same to rounding
 
 
-def as_given(experiment: Experiment, recording: Recording) -> Experiment:
-    """Return the experiment with the loop's force compared with its own method only.
+def as_given(experiment: Experiment, recording: Recording) -> Experiment | None:
+    """Return the experiment with the loop's force compared with its own method only; None for a
+    recording that is no live loop's.
 
     Raises `ComparisonError` for an experiment without a twin, which every live loop's has.
     """
+    if LIVE not in recording.metadata:
+        return None
     if experiment.twin is None:
         raise ComparisonError(
             f"experiment '{experiment.name}' has no twin, which replaying a loop needs"

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -12,63 +12,57 @@ from validate.fem.system import build as build_system
 from validate.parameters import nearest_names
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
+from validate.pipeline.live.clock import LiveRun, live
 from validate.pipeline.run.pipeline import set_out
 from validate.recording.types import Recording
 from validate.scene.meshless import Meshless
 from validate.solve.types import HandStepper
 
-# --- The path of a tool's tip in a recording: signals `tip.x`, `tip.y`(, `tip.z`) in m, or the
-# only point of a stream of markers `tip` (positions that a tracker did not see are null there).
-
 _AXES = "xyz"
-
-
-def recorded_tip(
-    recording: Recording, dimension: int, hint: str = ""
-) -> tuple[Floats, Floats, float]:
-    """Times t (nt,) s, places x (nt, d) m, NaN where not seen, and their sd m.
-
-    Raises `RecordingError` without such a path, or for one of another dimension, with the `hint`.
-    """
-    if "tip" in recording.markers:
-        marker = recording.marker("tip")
-        x = marker.x[:, 0]
-        _require_dimension(recording, x.shape[1], dimension, hint)
-        return marker.t, np.array(x), marker.sd
-    names = [f"tip.{a}" for a in _AXES]
-    there = sum(name in recording.signals for name in names)
-    parts = [recording.signal(name, "m") for name in names[: max(there, dimension)] if there]
-    if not parts:
-        raise RecordingError(
-            f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
-            f"{sorted(recording.streams)}"
-        )
-    _require_dimension(recording, len(parts), dimension, hint)
-    if any(not np.array_equal(s.t, parts[0].t) for s in parts):
-        raise RecordingError(
-            f"{recording.name}: tip.x .. tip.{_AXES[dimension - 1]} have "
-            f"{[len(s.t) for s in parts]} samples at different times; record them together"
-        )
-    return parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts)
-
-
-def _require_dimension(recording: Recording, found: int, wanted: int, hint: str) -> None:
-    if found != wanted:
-        words = f"{recording.name}: the tip has {found} coordinates, the body has {wanted}"
-        raise RecordingError(f"{words}; {hint}" if hint else words)
-
-
-# -------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class RecordedPath:
-    """t (nt,) s, places x (nt, d) m."""
+    """The path of a tool's tip: t (nt,) s, places x (nt, d) m, NaN where not seen, their `sd` m."""
 
     kind: ClassVar[str] = "path"
 
     t: Floats
     x: Floats
+    sd: float = 0.0
+
+    @classmethod
+    def of(cls, recording: Recording, dimension: int, hint: str = "") -> Self:
+        """Read signals `tip.x`, `tip.y`(, `tip.z`) in m, or the only point of a stream of markers
+        `tip` (positions that a tracker did not see are null there).
+
+        Raises `RecordingError` without such a path, or for one of another dimension, with the
+        `hint`.
+        """
+        if "tip" in recording.markers:
+            marker = recording.marker("tip")
+            x = marker.x[:, 0]
+            _require_dimension(recording, x.shape[1], dimension, hint)
+            return cls(marker.t, np.array(x), marker.sd)
+        names = [f"tip.{a}" for a in _AXES]
+        there = sum(name in recording.signals for name in names)
+        parts = [recording.signal(name, "m") for name in names[: max(there, dimension)] if there]
+        if not parts:
+            raise RecordingError(
+                f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
+                f"{sorted(recording.streams)}"
+            )
+        _require_dimension(recording, len(parts), dimension, hint)
+        if any(not np.array_equal(s.t, parts[0].t) for s in parts):
+            raise RecordingError(
+                f"{recording.name}: tip.x .. tip.{_AXES[dimension - 1]} have "
+                f"{[len(s.t) for s in parts]} samples at different times; record them together"
+            )
+        return cls(parts[0].t, np.hstack([s.y[:, :1] for s in parts]), max(s.sd for s in parts))
+
+    def live(self, stepper: HandStepper, seconds: float | None = None) -> LiveRun:
+        """Walk the path against the clock, to its end or for so many seconds."""
+        return live(stepper, self, seconds)
 
     @property
     def rate(self) -> float:
@@ -95,6 +89,12 @@ class RecordedPath:
 
     def close(self) -> None:
         pass
+
+
+def _require_dimension(recording: Recording, found: int, wanted: int, hint: str) -> None:
+    if found != wanted:
+        words = f"{recording.name}: the tip has {found} coordinates, the body has {wanted}"
+        raise RecordingError(f"{words}; {hint}" if hint else words)
 
 
 @dataclass(frozen=True)

@@ -244,6 +244,8 @@ _PLANE = (
 
 @dataclass(frozen=True)
 class InclusionRanges(Ranges):
+    """Standard uncertainties of the inputs of an inclusion test."""
+
     E: float = quantity(0.05, "1", "relative, of the modulus")
     nu: float = quantity(0.005, "1", "of the Poisson ratio")
     friction: float = quantity(0.03, "1", "absolute, of the plates' friction share k/(k + 4 E/x)")
@@ -281,13 +283,86 @@ class InclusionTest:
     ranges: InclusionRanges = InclusionRanges()
     loads: tuple[float, ...] = quantity((), "m", "stage positions compared")
 
+    @staticmethod
+    def inputs() -> tuple[Input, ...]:
+        """Return the inputs that every such experiment has, with the fields of
+        `InclusionRanges`."""
+        return (
+            vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
+            vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
+                 "nu within its declared uncertainty"),
+            Input("plate friction", rubbed, "share of the way from slipping to bonded plates",
+                  "assumed"),
+        )  # fmt: skip
 
-def rubbing(tree: Tree, share: float) -> Tree:
-    """Return the plates rub by a share, from 0 (they slip) to 1 (bonded)."""
-    contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
-    path = "foundations.plates."
-    changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
-    return changed
+    @staticmethod
+    def read(recording: Recording, tree: Tree) -> Recording:
+        """Return the recording with the outlines in the images of its sweep, where the body is
+        meshed from it."""
+        swept = tree.scene.body.inclusion.shape == "sweep"
+        return outlined_sweep(recording) if swept else recording
+
+    @staticmethod
+    def place(
+        recording: Recording, tree: Tree, scene: Scene, loads: tuple[float, ...],
+        together: tuple[Together, ...], corners: tuple[Corner, ...] = (),
+    ) -> Registered:  # fmt: skip
+        """Stage, outlines, markers and signals at rest and at `loads` m.
+
+        Raises `ComparisonError` without loads, `RegistrationError` for a signal that falls as the
+        plates close, and what the parts raise.
+        """
+        if not loads:
+            raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
+        streams, how = tree.settings.streams, tree.settings.registration
+        contours = shifted(recording.contour(streams.outline), tree)
+        measured = measured_inclusion(recording, tree)
+        shape = None if how.wall == "facets" else measured
+        wall = SurfaceSampler.of_cavity(
+            scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node"
+        )
+        stage = SignalObservation.driving(recording, streams.stage, "m")
+        signals = []
+        for topic in streams.signals:
+            # Where the unit is absent or of another kind, the one to be asked for
+            found = recording.signals.get(topic)
+            unit = found.unit if found is not None and found.unit in _TRACES else "N"
+            name, trace = _TRACES[unit]
+            signals.append(
+                SignalObservation.validating(recording, topic, unit, quantity=name, trace=trace)
+            )
+            require_rising(stage, signals[-1])
+        rest, *holds = holds_at(stage, contours.t, loads, within=WITHIN)
+        outline = OutlineObservation.of(
+            contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
+            sd_t=clock_sd(recording, streams.outline),
+        )  # fmt: skip
+        markers = MarkerObservation.placed(
+            recording, scene.mesh, topic=streams.markers, together=together,
+            tracker=streams.tracker, up=(0.0, 1.0, 0.0), how=how, sampling=how.sampling,
+        )  # fmt: skip
+        swept = tree.scene.body.inclusion.shape == "sweep"
+        said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
+        # A word where the meshed inclusion is not where the rest outline lies
+        meshed = inclusion(recording, tree)
+        off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
+        wide = meshed.radius - measured.radius
+        if off >= 0.5e-3 or abs(wide) >= 0.5e-3:
+            said = (
+                *said,
+                f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and "
+                f"its radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and "
+                "do not show this.",
+            )
+        return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
+
+    @staticmethod
+    def rubbing(tree: Tree, share: float) -> Tree:
+        """Return the plates rub by a share, from 0 (they slip) to 1 (bonded)."""
+        contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
+        path = "foundations.plates."
+        changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})
+        return changed
 
 
 def rubbed(tree: Tree, z: float) -> Tree:
@@ -298,20 +373,13 @@ def rubbed(tree: Tree, z: float) -> Tree:
         plates.contact, plates.stiffness, tree.scene.material.E, tree.scene.body.x
     )
     share = abs(share + z * tree.settings.ranges.friction)
-    return rubbing(tree, min(share, 2 - share))
+    return InclusionTest.rubbing(tree, min(share, 2 - share))
 
 
 #: More than three meshes: the inclusion is cut from the grids, which scatters. 8 x 9 x 14 cells
 #: have no common factor: within 5 % the grids are similar. Order 2: corners at the plates and
 #: facets on the wall limit that of quadratic elements.
 MESHES = vary("body.cells", "x 0.625 0.75 0.875 1.25, order 2")
-#: The inputs that every such experiment has, with the fields of `InclusionRanges`.
-INPUTS = (
-    vary("material.E", "relative ranges.E", "modulus", "E within its declared uncertainty"),
-    vary("material.nu", "absolute ranges.nu, below 0.5", "Poisson ratio",
-         "nu within its declared uncertainty"),
-    Input("plate friction", rubbed, "share of the way from slipping to bonded plates", "assumed"),
-)  # fmt: skip
 
 
 def inclusion_test(
@@ -333,75 +401,14 @@ def inclusion_test(
     ]
     return Experiment(
         name, title, source, parameters, methods, accepted, accept, load,
-        place=_place, kind=kind, variations=(MESHES, *INPUTS),
+        place=_place, kind=kind, variations=(MESHES, *InclusionTest.inputs()),
         uncertainty=Uncertainty(surrogate=(*cheap, *reversed(list(methods)))[0]),
     )  # fmt: skip
 
 
 def load(tree: Tree, folder: Path) -> tuple[Recording, ...]:
-    return tuple(outlined(recording, tree) for recording in beside(tree, folder))
-
-
-def outlined(recording: Recording, tree: Tree) -> Recording:
-    """Return the recording with the outlines in the images of its sweep, where the body is meshed
-    from it."""
-    return outlined_sweep(recording) if tree.scene.body.inclusion.shape == "sweep" else recording
+    return tuple(InclusionTest.read(recording, tree) for recording in beside(tree, folder))
 
 
 def _place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    return placed(recording, tree, scene, tree.settings.loads, _PLANE)
-
-
-# --- what a paper's own block of this kind uses too -----------------------------------------------
-
-
-def placed(
-    recording: Recording, tree: Tree, scene: Scene, loads: tuple[float, ...],
-    together: tuple[Together, ...], corners: tuple[Corner, ...] = (),
-) -> Registered:  # fmt: skip
-    """Stage, outlines, markers and signals at rest and at `loads` m.
-
-    Raises `ComparisonError` without loads, `RegistrationError` for a signal that falls as the
-    plates close, and what the parts raise.
-    """
-    if not loads:
-        raise ComparisonError("no loads: nothing can be compared; set stage positions in m")
-    streams, how = tree.settings.streams, tree.settings.registration
-    contours = shifted(recording.contour(streams.outline), tree)
-    measured = measured_inclusion(recording, tree)
-    shape = None if how.wall == "facets" else measured
-    wall = SurfaceSampler.of_cavity(scene.mesh, "cavity", shape, nearest=how.wall == "nearest_node")
-    stage = SignalObservation.driving(recording, streams.stage, "m")
-    signals = []
-    for topic in streams.signals:
-        # Where the unit is absent or of another kind, the one to be asked for
-        found = recording.signals.get(topic)
-        unit = found.unit if found is not None and found.unit in _TRACES else "N"
-        name, trace = _TRACES[unit]
-        signals.append(
-            SignalObservation.validating(recording, topic, unit, quantity=name, trace=trace)
-        )
-        require_rising(stage, signals[-1])
-    rest, *holds = holds_at(stage, contours.t, loads, within=WITHIN)
-    outline = OutlineObservation.of(
-        contours, wall, rest=instant(rest), corners=corners, name=streams.outline,
-        sd_t=clock_sd(recording, streams.outline),
-    )  # fmt: skip
-    markers = MarkerObservation.placed(
-        recording, scene.mesh, topic=streams.markers, together=together, tracker=streams.tracker,
-        up=(0.0, 1.0, 0.0), how=how, sampling=how.sampling,
-    )  # fmt: skip
-    swept = tree.scene.body.inclusion.shape == "sweep"
-    said = (off_circles(sweep_stack(recording, tree)),) if swept else ()
-    # A word where the meshed inclusion is not where the rest outline lies
-    meshed = inclusion(recording, tree)
-    off = float(np.linalg.norm(np.array(measured.centre) - np.array(meshed.centre)))
-    wide = meshed.radius - measured.radius
-    if off >= 0.5e-3 or abs(wide) >= 0.5e-3:
-        said = (
-            *said,
-            f"The meshed inclusion's centre is {1e3 * off:.2f} mm from the measured one and its "
-            f"radius {1e3 * wide:+.2f} mm off; outlines are drawn on the measured wall and do not "
-            "show this.",
-        )
-    return Registered((stage, outline, markers, *signals), tuple(holds), rest, findings=said)
+    return InclusionTest.place(recording, tree, scene, tree.settings.loads, _PLANE)

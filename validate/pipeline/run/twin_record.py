@@ -12,20 +12,18 @@ from typing import Any
 from validate.compare.result import Kind
 from validate.errors import UsageError
 from validate.parameters import describe, with_values
-from validate.recording.types import Recording
-
-_RECORD = "made_with"
+from validate.recording.types import MADE_WITH, Recording
 
 
 def stamped(recording: Recording, parameters: Any) -> Recording:
     """Return the recording with a record of every parameter but files."""
-    kept = MappingProxyType({**recording.metadata, _RECORD: _texts(parameters)})
+    kept = MappingProxyType({**recording.metadata, MADE_WITH: _texts(parameters)})
     return replace(recording, metadata=kept)
 
 
 def synthetic(recording: Recording) -> bool:
     """Return whether a recording says of itself that a model made it."""
-    return made_here(recording) or _told(recording) == "twin"
+    return bool(recording.made_with) or _told(recording) == "twin"
 
 
 def computed(recording: Recording) -> bool:
@@ -48,11 +46,6 @@ def _told(recording: Recording) -> str:
     return dict(recording.metadata.get("provenance", {})).get("kind", "")
 
 
-def made_here(recording: Recording) -> bool:
-    """Return whether a recording says which parameters it was made with."""
-    return _RECORD in recording.metadata
-
-
 def made_by(
     recording: Recording,
     parameters: Any,
@@ -66,7 +59,7 @@ def made_by(
     it is made anew with them. Raises `UsageError` where they differ from the `declared` ones and
     the recording does not say which it was made with: they would be ignored.
     """
-    made = dict(recording.metadata.get(_RECORD, {}))
+    made = dict(recording.made_with)
     mine = _texts(parameters)
     known = {path: text for path, text in made.items() if path in mine}
     require_known(recording, parameters, declared, remake, tuple(known))

@@ -251,42 +251,68 @@ class Offset:
     count: int
     coverage: float
 
+    @classmethod
+    def by_correlation(
+        cls,
+        reference: Signal,
+        stream: Signal,
+        within: float,
+        min_coverage: float = MIN_COVERAGE,
+        min_correlation: float = MIN_CORRELATION,
+    ) -> "Offset":
+        """Return the offset |tau| <= `within` (s) at which the stream follows the reference, up to
+        scale.
 
-def offset_by_correlation(
-    reference: Signal,
-    stream: Signal,
-    within: float,
-    min_coverage: float = MIN_COVERAGE,
-    min_correlation: float = MIN_CORRELATION,
-) -> Offset:
-    """Return the offset |tau| <= `within` (s) at which the stream follows the reference, up to
-    scale.
+        Both signals (nt, 1), of any rate, with gaps; a positive linear relation is assumed. Raises
+        `RecordingError`, with the numbers, for flat and periodic signals, ramps (any lag fits
+        them), a weak correlation, an offset at the edge of the search, and too small a coverage.
+        """
+        for signal, name in ((reference, "reference"), (stream, "stream")):
+            if signal.y.shape[1] != 1:
+                raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
+            if len(np.unique(signal.t)) < MIN_MATCHED:
+                raise RecordingError(
+                    f"{name}: {len(signal.t)} samples; at least {MIN_MATCHED} are needed"
+                )
+            y = signal.y[:, 0]
+            noise = noise_of(y)
+            spread = float(np.std(y))
+            if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
+                raise RecordingError(
+                    f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of "
+                    f"its noise ({noise:.3g}); it cannot be correlated, align by another stream"
+                )
+        if not within > 0:
+            raise RecordingError(f"offset within {within} s: expected a range above 0")
+        step = min(step_of(reference.t), step_of(stream.t))
+        coarse = coarse_lag(reference, stream, step, within, min_coverage, min_correlation)
+        seconds, sd = offset_near(reference, stream, coarse)
+        return matched(reference, stream, cls(seconds, sd, "correlation", 0, 0), min_coverage)
 
-    Both signals (nt, 1), of any rate, with gaps; a positive linear relation is assumed. Raises
-    `RecordingError`, with the numbers, for flat and periodic signals, ramps (any lag fits them), a
-    weak correlation, an offset at the edge of the search, and too small a coverage.
-    """
-    for signal, name in ((reference, "reference"), (stream, "stream")):
-        if signal.y.shape[1] != 1:
-            raise RecordingError(f"{name}: {signal.y.shape[1]} columns, expected 1; choose one")
-        if len(np.unique(signal.t)) < MIN_MATCHED:
+    def shift(self, recording: Recording, topic: str) -> Recording:
+        """Return a recording whose stream `topic` is moved by the offset, kept as a record.
+
+        Times start again at the earliest sample of all streams. Raises `RecordingError` for an
+        unknown topic and for one that was moved before.
+        """
+        name = RECORD + topic
+        if name in recording.metadata:
             raise RecordingError(
-                f"{name}: {len(signal.t)} samples; at least {MIN_MATCHED} are needed"
+                f"'{topic}' was shifted by {recording.metadata[name].get('seconds')} s before; "
+                "shift the stream of the first recording instead"
             )
-        y = signal.y[:, 0]
-        noise = noise_of(y)
-        spread = float(np.std(y))
-        if spread <= max(1.2 * noise, 1e-12 * float(np.abs(y).max())):
-            raise RecordingError(
-                f"{name}: flat, its standard deviation {spread:.3g} {signal.unit} is that of its "
-                f"noise ({noise:.3g}); it cannot be correlated, align by another stream"
-            )
-    if not within > 0:
-        raise RecordingError(f"offset within {within} s: expected a range above 0")
-    step = min(step_of(reference.t), step_of(stream.t))
-    coarse = coarse_lag(reference, stream, step, within, min_coverage, min_correlation)
-    seconds, sd = offset_near(reference, stream, coarse)
-    return matched(reference, stream, Offset(seconds, sd, "correlation", 0, 0), min_coverage)
+        if topic not in recording.streams:
+            known = sorted(recording.streams)
+            raise RecordingError(f"no stream '{topic}' to shift; the recording has {known}")
+        record = {
+            "seconds": repr(self.seconds),
+            "sd": repr(self.sd),
+            "method": self.method,
+            "count": str(self.count),
+            "coverage": repr(self.coverage),
+        }
+        metadata = {**recording.metadata, name: record}
+        return rebased(replace(moved(recording, self.seconds, topic), metadata=metadata))
 
 
 def offset_near(reference: Signal, stream: Signal, start: float) -> tuple[float, float]:
@@ -338,32 +364,6 @@ def _require_coverage(offset: Offset, total: int, least: float) -> None:
             f"({100 * offset.coverage:.0f} %) meet the reference; at least {100 * least:.0f} % are "
             "needed; record longer together or lower the required share (--coverage)"
         )
-
-
-def shift(recording: Recording, topic: str, offset: Offset) -> Recording:
-    """Return a recording whose stream `topic` is moved by the offset, which is kept as a record.
-
-    Times start again at the earliest sample of all streams. Raises `RecordingError` for an unknown
-    topic and for one that was moved before.
-    """
-    name = RECORD + topic
-    if name in recording.metadata:
-        raise RecordingError(
-            f"'{topic}' was shifted by {recording.metadata[name].get('seconds')} s before; "
-            "shift the stream of the first recording instead"
-        )
-    if topic not in recording.streams:
-        known = sorted(recording.streams)
-        raise RecordingError(f"no stream '{topic}' to shift; the recording has {known}")
-    record = {
-        "seconds": repr(offset.seconds),
-        "sd": repr(offset.sd),
-        "method": offset.method,
-        "count": str(offset.count),
-        "coverage": repr(offset.coverage),
-    }
-    metadata = {**recording.metadata, name: record}
-    return rebased(replace(moved(recording, offset.seconds, topic), metadata=metadata))
 
 
 def rebased(recording: Recording) -> Recording:

@@ -12,7 +12,6 @@ Limits: the region must be star-shaped about its centroid; regions under about 2
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import floor
 from typing import Literal
 
@@ -250,38 +249,6 @@ def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: b
     plain = image.astype(np.float64)
     dark = 255.0 - plain if bright else plain
     return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
-
-
-def outlines_of(
-    frames: Frames,
-    *,
-    centre: Sequence[float] | Floats | None = None,
-    radius: float | None = None,
-    shape: Shape = "free",
-    bright: bool = False,
-    images: str = "",
-) -> Contours:
-    """Return the outline of every image; sd is the root mean square of all.
-
-    `images` is the topic of the frames, kept with the outlines. Other options as in
-    `extract_outline`. Raises `RecordingError` naming the first image without one and how many there
-    are: none is left out silently.
-    """
-    find = partial(extract_outline, centre=centre, radius=radius, shape=shape, bright=bright)
-    outlines: list[Outline] = []
-    refused: list[str] = []
-    for i, image in enumerate(frames.images):
-        try:
-            outlines.append(find(image, frames.m_per_px))
-        except RecordingError as error:
-            refused.append(f"image {i} (t = {frames.t[i]:.3f} s): {error}")
-    if refused:
-        raise RecordingError(
-            f"{len(refused)} of {len(frames.images)} images without an outline, first {refused[0]}"
-        )
-    sd = rms([o.sd for o in outlines])
-    points = tuple(o.points for o in outlines)
-    return Contours(frames.t, points, sd, frames.pose, frames.frame, images)
 
 
 def _starts(

@@ -10,6 +10,7 @@ from the ones before.
 
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
+from typing import Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -60,35 +61,35 @@ class Dwell:
         i = int(held[0] if len(held) else off.argmin())
         return Dwell(self.begin + i, self.begin + i + k, self.t[i : i + k], self.x[i : i + k])
 
+    @classmethod
+    def of_path(cls, t: Floats, x: Floats, radius: float, least: float) -> tuple[Self, ...]:
+        """Return the parts of a path x (n, 3) m at t (n,) s that stay within `radius` m for `least`
+        s and more.
 
-def dwells(t: Floats, x: Floats, radius: float, least: float) -> tuple[Dwell, ...]:
-    """Parts of a path x (n, 3) m at t (n,) s that stay within `radius` m for `least` s and more.
-
-    The radius is no smaller than the path's own noise from sample to sample asks for. The samples
-    in which the tip still comes or already leaves are cut off.
-    """
-    smooth = median_filter(x, (_SPIKE, 1), mode="nearest")
-    # Standard deviation m along an axis of what changes from sample to sample, while a tip
-    # stands: from the median of second differences, which a motion over less than half of
-    # them leaves.
-    bends = np.abs(np.diff(x, n=2, axis=0))
-    radius = max(
-        radius,
-        _CLEAR * (float(np.median(bends)) / 0.6745 / float(np.sqrt(6)) if bends.size else 0.0),
-    )
-    # Spans, one behind the other, whose samples lie within the radius of the mean before
-    # them.
-    spans, begin = [], 0
-    mean = smooth[0].copy()
-    for i in range(1, len(smooth)):
-        if np.linalg.norm(smooth[i] - mean) <= radius:
-            mean += (smooth[i] - mean) / (i + 1 - begin)
-            continue
-        spans.append((begin, i))
-        begin, mean = i, smooth[i].copy()
-    spans = _joined(t, smooth, [*spans, (begin, len(smooth))], radius)
-    found = [_settled_dwell(t, x, smooth, *span) for span in spans]
-    return tuple(d for d in found if d.t[-1] - d.t[0] >= least)
+        The radius is no smaller than the path's own noise from sample to sample asks for. The
+        samples in which the tip still comes or already leaves are cut off.
+        """
+        smooth = median_filter(x, (_SPIKE, 1), mode="nearest")
+        # Standard deviation m along an axis of what changes from sample to sample, while a tip
+        # stands: from the median of second differences, which a motion over less than half of
+        # them leaves.
+        bends = np.abs(np.diff(x, n=2, axis=0))
+        noise = float(np.median(bends)) / 0.6745 / float(np.sqrt(6)) if bends.size else 0.0
+        radius = max(radius, _CLEAR * noise)
+        # Spans, one behind the other, whose samples lie within the radius of the mean before
+        # them.
+        spans, begin = [], 0
+        mean = smooth[0].copy()
+        for i in range(1, len(smooth)):
+            if np.linalg.norm(smooth[i] - mean) <= radius:
+                mean += (smooth[i] - mean) / (i + 1 - begin)
+                continue
+            spans.append((begin, i))
+            begin, mean = i, smooth[i].copy()
+        spans = _joined(t, smooth, [*spans, (begin, len(smooth))], radius)
+        ends = [_settled_span(smooth, *span) for span in spans]
+        found = [cls(low, high, t[low:high], x[low:high]) for low, high in ends]
+        return tuple(d for d in found if d.t[-1] - d.t[0] >= least)
 
 
 def sd_of_mean(parts: tuple[Dwell, ...], whole: tuple[Dwell, ...]) -> float:
@@ -121,12 +122,11 @@ def _joined(
     return out
 
 
-def _settled_dwell(t: Floats, x: Floats, smooth: Floats, begin: int, end: int) -> Dwell:
+def _settled_span(smooth: Floats, begin: int, end: int) -> tuple[int, int]:
     """Without the ends in which the tip moves faster than while it stands."""
     speed = np.linalg.norm(np.diff(smooth[begin:end], axis=0), axis=1)
     calm = np.flatnonzero(speed <= _SETTLING * np.median(speed))
-    low, high = begin + int(calm[0]), begin + int(calm[-1]) + 2
-    return Dwell(low, high, t[low:high], x[low:high])
+    return begin + int(calm[0]), begin + int(calm[-1]) + 2
 
 
 # --- Which of the places that were touched is which landmark: by their distances, in any order.
@@ -248,6 +248,35 @@ class Digitised:
     known: Floats
     match: Match
     sd: float
+
+    @classmethod
+    def of(
+        cls,
+        t: Floats,
+        x: Floats,
+        dwells: tuple[Dwell, ...],
+        parts: tuple[Dwell, ...],
+        names: tuple[str, ...],
+        known: Floats,
+        within: float,
+    ) -> Self:
+        """Return which part is which landmark, each within `within` m of its own.
+
+        Raises `RegistrationError` for fewer than four landmarks, and where two assignments fit
+        alike and neither is in the order of the list.
+        """
+        match = match_landmarks(known, np.array([d.centre for d in parts]), within)
+        used, whole = (tuple(group[i] for i in match.seen) for group in (parts, dwells))
+        return cls(t, x, dwells, parts, names, known, match, sd_of_mean(used, whole))
+
+    def along(self, x: Floats) -> Self:
+        """Return the same landmarks with another path x (n, 3) m, as of a corrected tip."""
+        parts, dwells = (
+            tuple(replace(d, x=x[d.begin : d.end]) for d in group)
+            for group in (self.parts, self.dwells)
+        )
+        used, whole = (tuple(group[i] for i in self.match.seen) for group in (parts, dwells))
+        return replace(self, x=x, dwells=dwells, parts=parts, sd=sd_of_mean(used, whole))
 
     @property
     def touched(self) -> tuple[str, ...]:

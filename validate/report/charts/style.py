@@ -120,6 +120,17 @@ def draw(paint: Callable[[Figure], None], width: float, height: float, dpi: floa
     return _pixels(painted(paint, width, height, dpi).canvas)
 
 
+def drawn_picture(
+    name: str, caption: str, alt: str, paint: Callable[[Figure], None], inches: tuple[float, float]
+) -> Picture:
+    """Return an experiment's own drawing as a picture of its report, in the report's style.
+
+    `paint` fills a matplotlib figure of (width, height) `inches`; `alt` says in words what is
+    seen.
+    """
+    return Picture(name, caption, alt, draw(paint, *inches))
+
+
 def painted(
     paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI,
     size: float = 1.0,

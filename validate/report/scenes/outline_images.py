@@ -1,5 +1,6 @@
 """Images of a recording with outlines, fitted circles and simulated sections."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
@@ -72,22 +73,24 @@ def outline_images(
         return ()
     words = f"Dotted, orange: the section of {label}, which is compared with the outline."
     simulated = (f"simulated: {label}", sections)
-    return (outlines_over(frames, contours, holds, "at the loads", words, simulated),)
+    at = [(hold.label, hold.t) for hold in holds]
+    return (outlines_over(frames, contours, at, "at the loads", words, simulated),)
 
 
 def outlines_over(
     frames: Frames,
     contours: Contours,
-    holds: tuple[Held, ...],
+    at: Sequence[tuple[str, float]],
     which: str,
     words: str,
     simulated: tuple[str, tuple[Floats, ...]] = ("", ()),
     marks: tuple[PlaceSaid, ...] = (),
 ) -> tuple[ImageSeries, Picture]:
-    """Return the images nearest to the holds in time, with outlines, with circles where the first
-    outline is round, with what was `simulated` at the holds, and with `marks` in the first: up to
-    twelve for a slider, and all as one picture. `which` they are, and `words` on what they are for,
-    stand in the caption."""
+    """Return the images nearest to instants `at`, each a label and s, with outlines, with circles
+    where the first outline is round, with what was `simulated` then, and `marks` in the first:
+    up to twelve for a slider, and all as one picture. `which` they are, and `words` on what they
+    are for, stand in the caption."""
+    holds = tuple(Held(label, 0.0, "1", t) for label, t in at)
     circles = _circles(contours, holds)
     lines = [
         [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]

@@ -47,7 +47,6 @@ from validate.solve.study_entries import (
     StudyBody,
     SwingingBody,
     implicit_maps,
-    newmark_maps,
 )
 from validate.solve.types import Ending, Scheme, State, Stepper
 
@@ -56,7 +55,7 @@ from validate.solve.types import Ending, Scheme, State, Stepper
 
 def misprinted_maps(r: Rates) -> Floats:
     """Return the step map of the printed update."""
-    return newmark_maps(Rule.of("average", 1.0), r.c("full"), r.x**2, misprinted=True)
+    return Rule.of("average", 1.0).maps(r.c("full"), r.x**2, misprinted=True)
 
 
 def misprint_limit(w: float, c: float) -> float:

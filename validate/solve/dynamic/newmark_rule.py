@@ -52,6 +52,19 @@ class Rule:
         """Return an acceleration at the instant of the balance: `new` itself unless am != 0."""
         return new if self.am == 0 else (1 - self.am) * new + self.am * old
 
+    def maps(self, c: Floats, k: Floats, *, misprinted: bool = False) -> Floats:
+        """Return the maps (r, 3, 3) of (q, q', q'') over a step of q'' + c q' + k q = 0; c 1/s,
+        k 1/s^2 (r,). `misprinted`: with the update of u that paper 002 prints."""
+        one, zero = np.ones_like(c), np.zeros_like(c)
+        q = np.stack(per_mode(self, c, k)[:3], axis=-1)
+        v_old = np.stack([zero, one, zero], axis=-1)
+        a_old = np.stack([zero, zero, one], axis=-1)
+        q_old = np.stack([one, zero, zero], axis=-1)
+        v, a = self.rates(q, q_old, v_old, a_old)
+        if misprinted:
+            q = q + self.h * (v - v_old)
+        return np.stack([q, v, a], axis=1)
+
     @classmethod
     def of(cls, name: RuleName, dt: float, rho_inf: float = 0.8) -> Self:
         """Return the rule by name; raises `SceneError` for dt <= 0 or too small, or rho_inf outside

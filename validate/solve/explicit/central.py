@@ -19,7 +19,7 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import lumped, mass
-from validate.fem.critical import lanczos_step
+from validate.fem.critical import CriticalStep
 from validate.fem.kernels.threads import Team, idle_cores, pilot
 from validate.fem.large_strain.explicit import (
     BodyLook,
@@ -336,7 +336,7 @@ class CentralStepper:
             full[free] = x
             return self.body.tangent_product(u, full)[free]
 
-        undamped = lanczos_step(apply, self.masses).limit
+        undamped = CriticalStep.by_lanczos(apply, self.masses).limit
         limit = float(np.hypot(undamped, self.beta)) - self.beta
         return replace(past, limit=limit, limit_u=u)
 
@@ -401,7 +401,7 @@ def _step_at_rest(lagged: bool) -> Callable[[System], float]:
     def limit(system: System) -> float:
         free = system.free
         K = system.K[free][:, free]
-        h = lanczos_step(lambda x: K @ x, system.masses[free]).limit
+        h = CriticalStep.by_lanczos(lambda x: K @ x, system.masses[free]).limit
         beta = system.scene.material.stiffness_damping if lagged else 0.0
         # The same as hypot(h, beta) - beta, without its cancellation.
         return float(h * h / (np.hypot(h, beta) + beta))

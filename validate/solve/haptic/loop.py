@@ -30,7 +30,7 @@ from scipy import sparse
 
 from validate.arrays import Floats, Ints
 from validate.errors import SceneError, UsageError
-from validate.fem.critical import critical_step
+from validate.fem.critical import CriticalStep
 from validate.fem.large_strain.explicit import ExplicitMotion
 from validate.fem.system import System
 from validate.parameters import quantity
@@ -373,7 +373,7 @@ class HapticLoop:
             )
         touchable = TouchableBody(bare, free)
         # Explicit steps in a tick: stable with the spring on any one node, by Weyl's bound
-        found = critical_step(bare).lanczos
+        found = CriticalStep.of(bare).lanczos
         least = float(bare.masses.reshape(touchable.places.shape)[touchable.surface].min())
         limit = 2 / np.sqrt((2 / found) ** 2 + self.spring / least)
         substeps = int(np.ceil(self.dt / ((1 - self.margin) * limit)))

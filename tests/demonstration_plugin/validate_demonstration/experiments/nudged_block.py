@@ -16,7 +16,6 @@ from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tre
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
 from validate.register.registration import Registered
-from validate.register.scene_registration import follow_signal
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Load, Probe, Scene, Support
@@ -73,7 +72,7 @@ def truth(tree: Tree, seen: Registered) -> Truth:
 
 
 def place(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    return follow_signal(recording, scene.mesh, "pull", "N")
+    return Registered.following(recording, scene.mesh, "pull", "N")
 
 
 def sets(tree: Tree, seen: Registered) -> Mapping[str, Any]:

@@ -6,10 +6,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from experiments.needle_block.volume_penalty import Normals, volume_penalty
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.assembly.assemble import divergence, stiffness
-from validate.fem.assembly.volume_constraints import Normals, volume_penalty
 from validate.fem.system import build
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
@@ -151,7 +151,7 @@ def test_what_has_no_such_penalty_is_refused() -> None:
         volume_penalty(scene, -1.0)
     with pytest.raises(SceneError, match="thickness is free"):
         volume_penalty(replace(scene, plane="stress"), 1.0)
-    with pytest.raises(SceneError, match="linear cells, not tri6"):
+    with pytest.raises(SceneError, match="linear simplices, not tri6"):
         volume_penalty(replace(scene, body=scene.mesh.quadratic()), 1.0)
-    with pytest.raises(SceneError, match="quad4 have no constant strain"):
+    with pytest.raises(SceneError, match="linear simplices, not quad4"):
         volume_penalty(replace(scene, body=grid((1.0, 1.0), (2, 2))), 1.0)

@@ -16,7 +16,7 @@ from validate.fem.system import System, damping_of, mass_of
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.dynamic.newmark_rule import Rule
 from validate.solve.explicit.linear import ExplicitLinear
-from validate.solve.study_entries import explicit_maps, newmark_maps, spectral_radii
+from validate.solve.study_entries import explicit_maps, spectral_radii
 
 DENSE_LIMIT = 2000  # free unknowns whose modes are all taken: some 10 s
 _COUPLED = 1e-8  # of the damping, as in `fem.critical`
@@ -43,7 +43,7 @@ def amplification(system: System, scheme: Newmark | ExplicitLinear) -> Amplifica
         maps = explicit_maps(scheme.dt, c, omegas**2, scheme.update)
     else:
         rule = Rule.of(scheme.rule, scheme.dt, scheme.rho_inf)
-        maps = newmark_maps(rule, c, omegas**2, misprinted=scheme.update == "misprinted")
+        maps = rule.maps(c, omegas**2, misprinted=scheme.update == "misprinted")
     radii = spectral_radii(maps)
     worst = int(np.argmax(radii))
     return Amplification(float(radii[worst]), float(omegas[worst]), radii, omegas)
