@@ -80,7 +80,7 @@ def logs(monkeypatch: pytest.MonkeyPatch) -> DataSet:
     made = DataSet("logs", "force/logs", "logs", "lab/logs", "0123456", "MIT", "Lab (2026).", files)
     for module in (home, command):
         monkeypatch.setattr(module, "data_sets", lambda: (made,))
-    monkeypatch.setattr(home, "named", lambda _: made)
+    monkeypatch.setattr(home, "data_set_of", lambda _: made)
     return made
 
 

@@ -96,7 +96,7 @@ def test_the_cache_counts_only_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     rows = [(FILE, b"measured"), ("LICENSE", b"free")]
     files = tuple(DataFile(n, n, sha256(b).hexdigest(), len(b)) for n, b in rows)
     beam = DataSet("silicone-beam", FOLDER, "t", "a/b", "0" * 40, "MIT", "c", files)
-    monkeypatch.setattr(home, "named", lambda _: beam)
+    monkeypatch.setattr(home, "data_set_of", lambda _: beam)
     monkeypatch.setenv(home.SHARED, str(tmp_path / "without"))
     path = put(home.cache_folder() / FOLDER / FILE, b"measured")
     assert data_path(FOLDER, FILE, tmp_path / "p" / "experiments") == path

@@ -15,6 +15,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Recording, Source
+from validate.register.signals import SignalObservation
 from validate.scene.geometries.hollow_block import Cavities, HollowBlock
 from validate.scene.scene import Cavity
 
@@ -274,7 +275,7 @@ def test_a_wall_that_does_not_settle_and_a_pressure_that_was_not_recorded_are_re
     assert settled == pytest.approx(x, rel=1e-9)  # u = (x + u)/2
     recording = Recording("r", Source("r", "", 0, ""), 0)
     for name in ("driving", "validating"):
-        monkeypatch.setattr(block, name, lambda *_, **__: None)
+        monkeypatch.setattr(SignalObservation, name, lambda *_, **__: None)
     scene = SimpleNamespace(cavities=(SimpleNamespace(name="cavity0"),))
     with pytest.raises(ComparisonError, match=r"r.*signal 'pressure0' for cavity 0 of 1"):
         block.place(recording, DECLARED, scene)

@@ -179,14 +179,14 @@ def test_a_mesh_too_coarse_is_left_out_unless_it_is_the_methods_own() -> None:
 
 def test_an_inclusion_without_loads_compares_nothing() -> None:
     with pytest.raises(ComparisonError, match="no loads: nothing can be compared; set"):
-        inclusion.placed(None, None, None, (), ())  # type: ignore[arg-type]
+        inclusion.InclusionTest.place(None, None, None, (), ())  # type: ignore[arg-type]
 
 
 def test_what_was_not_loaded_or_recorded_by_a_twin_is_refused() -> None:
     with pytest.raises(ComparisonError, match="experiment 'x' was not loaded from"):
         folder_of(bare(path=None))  # type: ignore[arg-type]
     with pytest.raises(ComparisonError, match="experiment 'x' has no twin"):
-        as_given(bare(twin=None), None)  # type: ignore[arg-type]
+        as_given(bare(twin=None), SimpleNamespace(metadata={"live": {}}))  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"unknown method 'hold'; .*held"):
         prepared_live(bare(methods={"held": None}, accepted=("held",)), None, "hold")  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="--parameters mass"):

@@ -17,7 +17,6 @@ from validate.recording.clocks.alignment import (
     matched,
     rebased,
     refined_lag,
-    shift,
 )
 from validate.recording.clocks.events import event_time, offset_by_event
 from validate.recording.mcap.read import read_recording
@@ -194,7 +193,7 @@ def test_a_shift_is_kept_shown_and_not_made_twice(tmp_path: Path) -> None:
 
 def test_a_clock_without_date_never_runs_below_zero() -> None:
     recording = replace(sample_recording(), t0_ns=0)
-    moved = shift(recording, "/force", Offset(-2.0, 0.1, "given by the user", 0, 0.0))
+    moved = Offset(-2.0, 0.1, "given by the user", 0, 0.0).shift(recording, "/force")
     assert moved.t0_ns == 0
     assert moved.signals["/force"].t[0] == 0
     assert moved.markers["/markers"].t[0] == pytest.approx(2.0)

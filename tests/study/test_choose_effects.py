@@ -8,7 +8,7 @@ import pytest
 
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.ladder.ladder import Rival
-from validate.solve.schemes import candidates
+from validate.solve.schemes import SCHEMES
 from validate.solve.study_entries import StillBody
 from validate.study.choose.facts import ShownEffects, effect_words, stored_effects, with_effects
 
@@ -32,7 +32,7 @@ def stored(folder: Path, experiment: Experiment, shown: dict[str, float]) -> Non
 class Candidates:
     """Of a ladder what effects read."""
 
-    solvers: tuple[Rival, ...] = candidates(StillBody(True, 1.0, 1.0, 1, 1))
+    solvers: tuple[Rival, ...] = SCHEMES.candidates(StillBody(True, 1.0, 1.0, 1, 1))
     steps: tuple[float, ...] = (1.0,)
 
 

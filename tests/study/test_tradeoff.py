@@ -71,7 +71,7 @@ def block(element: str, level: int, law: LawName) -> Scene:
 def small(job: Job | None = None) -> Trial:
     return Trial(
         block, lambda level: 0.1 / level,
-        {"P1": (1, 2), "P2": (1,)}, {"P1": 2.0, "P2": 3.0}, STEPS,
+        {"P1": (1, 2), "P2": (1,)}, STEPS,
         lambda t: np.full((len(t), 1), 0.8), np.arange(0.04, 0.21, 0.04),
         np.array([[0.05, 0.05, 0.1], [0.05, 0.05, 0.05]]), ("P2", 2),
         lambda dt: Modal(dt, propagate="constant"),

@@ -417,7 +417,30 @@ class Experiment:
     ) -> None:
         if scene is not None or settings is not None:
             object.__setattr__(self, "parameters", Tree(recording, scene, settings))
-        self._vary(variations)
+        # Sorts variations into what they are: uncertain inputs, meshes, steps, calibrations
+        meshes = [v for v in variations if isinstance(v, MeshLadder)]
+        steps = [v for v in variations if isinstance(v, StepLadder)]
+        inputs = tuple(v for v in variations if isinstance(v, Input))
+        if max(len(meshes), len(steps)) > 1:
+            raise UsageError(
+                f"{self.name}: {len(meshes)} variations of body.cells and {len(steps)} of dt; give "
+                "at most one of each, with all its factors"
+            )
+        if meshes or steps or inputs:
+            least = self.uncertainty or Uncertainty()
+            more = replace(
+                least, mesh=(*meshes, least.mesh)[0], steps=(*steps, least.steps)[0],
+                inputs=(*least.inputs, *inputs),
+            )  # fmt: skip
+            object.__setattr__(self, "uncertainty", more)
+        object.__setattr__(
+            self, "sweeps", (*self.sweeps, *(v for v in variations if isinstance(v, Sweep)))
+        )
+        opens = tuple(v for v in variations if isinstance(v, Free))
+        for on in dict.fromkeys(v.on for v in opens):
+            several = tuple(v for v in opens if v.on == on)
+            by = Calibration(next(iter(self.accepted)), several, (Calibrates(on),))
+            object.__setattr__(self, "calibrations", (*self.calibrations, by))
         # Mesh files of a declared body are found from the experiment's folder
         folder = self.path.parent if self.path else Path()
         if isinstance(self.build, Built):
@@ -444,32 +467,6 @@ class Experiment:
         below = (f"source: {self.source}", f"file: {self.path or 'none'}")
         head = ("method", "what it is", "accepted")
         return Screen(f"{self.name}: {self.title}", (), head, rows, below)
-
-    def _vary(self, variations: tuple[Variation, ...]) -> None:
-        """Sorts variations into what they are: uncertain inputs, meshes, steps, calibrations."""
-        meshes = [v for v in variations if isinstance(v, MeshLadder)]
-        steps = [v for v in variations if isinstance(v, StepLadder)]
-        inputs = tuple(v for v in variations if isinstance(v, Input))
-        if max(len(meshes), len(steps)) > 1:
-            raise UsageError(
-                f"{self.name}: {len(meshes)} variations of body.cells and {len(steps)} of dt; give "
-                "at most one of each, with all its factors"
-            )
-        if meshes or steps or inputs:
-            declared = self.uncertainty or Uncertainty()
-            more = replace(
-                declared, mesh=(*meshes, declared.mesh)[0], steps=(*steps, declared.steps)[0],
-                inputs=(*declared.inputs, *inputs),
-            )  # fmt: skip
-            object.__setattr__(self, "uncertainty", more)
-        object.__setattr__(
-            self, "sweeps", (*self.sweeps, *(v for v in variations if isinstance(v, Sweep)))
-        )
-        opens = tuple(v for v in variations if isinstance(v, Free))
-        for on in dict.fromkeys(v.on for v in opens):
-            several = tuple(v for v in opens if v.on == on)
-            by = Calibration(next(iter(self.accepted)), several, (Calibrates(on),))
-            object.__setattr__(self, "calibrations", (*self.calibrations, by))
 
     @property
     def complete(self) -> bool:

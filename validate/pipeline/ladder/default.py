@@ -185,7 +185,30 @@ def body_of(experiment: Experiment) -> StabilityBody | None:
     if own.scene.material.rho is None:
         return None
     _require_instants(own)
-    return _body(own)
+    # The body without its fluid, in linear cells, on meshes whose modes can all be taken
+    if own.scene.tools:
+        raise _untaken(own)
+    fitting = [n for n in own.levels(_LEVELS) if linear(own.at(n).mesh).nodes.size <= LARGEST]
+    if not fitting:
+        raise UsageError(
+            f"'{own.experiment.name}' has {linear(own.scene.mesh).nodes.size} unknowns and cannot "
+            f"be coarsened to {LARGEST}, all of whose modes are taken; give it a number of cells "
+            "as a parameter, or declare a body in its ladder"
+        )
+    meshes = own.levels([round(share * fitting[-1]) for share in _COARSER])
+    drive = None if own.scene.loads else own.scene.drives[0]
+    steps = np.diff(own.seen.t)
+    base = Turned.of(own.scene.material, meshes[-1])
+    return StabilityBody(
+        f"{own.experiment.title} ({linear(own.scene.mesh).kind} cells; mesh: percent of the "
+        f"experiment's mesh)",
+        lambda level, material: _solid(own, level, material),
+        base,
+        meshes,
+        float(np.median(steps)),
+        pull=None if drive is None else Load("pull", drive.facets, drive.direction),
+        qualities=QUALITY if _squeezable(_solid(own, meshes[-1], base.material)) else (1.0,),
+    )
 
 
 # --- error against time ---------------------------------------------------------------------------
@@ -391,33 +414,6 @@ def _points(
 
 
 # --- stability ------------------------------------------------------------------------------------
-
-
-def _body(own: ExperimentBody) -> StabilityBody:
-    """The body without its fluid, in linear cells, on meshes whose modes can all be taken."""
-    if own.scene.tools:
-        raise _untaken(own)
-    fitting = [n for n in own.levels(_LEVELS) if linear(own.at(n).mesh).nodes.size <= LARGEST]
-    if not fitting:
-        raise UsageError(
-            f"'{own.experiment.name}' has {linear(own.scene.mesh).nodes.size} unknowns and cannot "
-            f"be coarsened to {LARGEST}, all of whose modes are taken; give it a number of cells "
-            "as a parameter, or declare a body in its ladder"
-        )
-    meshes = own.levels([round(share * fitting[-1]) for share in _COARSER])
-    drive = None if own.scene.loads else own.scene.drives[0]
-    steps = np.diff(own.seen.t)
-    base = Turned.of(own.scene.material, meshes[-1])
-    return StabilityBody(
-        f"{own.experiment.title} ({linear(own.scene.mesh).kind} cells; mesh: percent of the "
-        f"experiment's mesh)",
-        lambda level, material: _solid(own, level, material),
-        base,
-        meshes,
-        float(np.median(steps)),
-        pull=None if drive is None else Load("pull", drive.facets, drive.direction),
-        qualities=QUALITY if _squeezable(_solid(own, meshes[-1], base.material)) else (1.0,),
-    )
 
 
 def _solid(own: ExperimentBody, level: int, material: Material) -> Scene:

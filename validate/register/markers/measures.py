@@ -298,7 +298,11 @@ def _closest(source: Floats, target: Floats, start: Similarity, fit: Fit) -> Rel
             break
         order = assigned
         transform = fit(source, target[order])
-    order = _settled(_squared(transform, source, target), _spacing(target))
+    # The assignment when all distances beyond the marker spacing count the same. An outlier then
+    # keeps its label, where plain squares would shift a whole row to meet it.
+    cost = np.minimum(_squared(transform, source, target) / _spacing(target) ** 2, 1.0)
+    cost -= 1e-9 * np.eye(len(cost))  # ties go to the given label
+    order = linear_sum_assignment(cost)[1]
     transform = fit(source, target[order])
     return Relabelling(order, rms(transform.apply(source) - target[order]))
 
@@ -306,17 +310,6 @@ def _closest(source: Floats, target: Floats, start: Similarity, fit: Fit) -> Rel
 def _squared(transform: Similarity, source: Floats, target: Floats) -> Floats:
     distances: Floats = cdist(transform.apply(source), target, "sqeuclidean")
     return distances
-
-
-def _settled(squared: Floats, spacing: float) -> Ints:
-    """The assignment when all distances beyond the marker spacing count the same.
-
-    An outlier then keeps its label, where plain squares would shift a whole row to meet it.
-    """
-    cost = np.minimum(squared / spacing**2, 1.0)
-    cost -= 1e-9 * np.eye(len(cost))  # ties go to the given label
-    order: Ints = linear_sum_assignment(cost)[1]
-    return order
 
 
 def _axes(points: Floats) -> Floats:
