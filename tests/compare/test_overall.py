@@ -11,7 +11,7 @@ from scipy.stats import norm
 from validate.commands.run_screen import headline
 from validate.compare.overall_verdict import correction, judge_all
 from validate.compare.verdict import ALPHA, Acceptance, Check, Validation
-from validate.pipeline.checks.likely_causes import verdict_sentence
+from validate.pipeline.checks.verdict_sentence import verdict_sentence
 
 _NAMES = count()
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from validate.parameters import Parameter
-from validate.pipeline.checks.likely_causes import doubts
+from validate.pipeline.checks.plausibility import doubts
 from validate.pipeline.run.method_run import MethodRun
 from validate.recording.types import Frames, Recording, Signal, Source
 from validate.register.registration import Registered

@@ -1,4 +1,4 @@
-"""Verdicts of the accepted methods, and likely causes of differences.
+"""Verdicts of the accepted methods, their sentence, likely causes of differences, plausible inputs.
 
 Start with `checks`.
 """

@@ -1,4 +1,4 @@
-"""Verdicts in words: the sentence, likely causes of a difference, plausibility of the inputs.
+"""Likely causes of a difference between a computed and a measured history.
 
 A history is that of markers, of an outline's places, or of a force. Each cause is a correction of
 the computed one with one or two numbers: a lag of the clock, a factor (unit, or load over modulus),
@@ -8,8 +8,7 @@ the residual's mean square that the best correction removes ranks them. A share 
 residual looks like, not what is true: each cause names the measurement or run that would tell.
 """
 
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -17,21 +16,13 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.compare.exhibit import Exhibit, NumberTable
-from validate.compare.overall_verdict import Overall, correction, judge_all
-from validate.compare.published import Published
-from validate.compare.result import Kind, MethodResult
-from validate.compare.verdict import Check
+from validate.compare.result import MethodResult
 from validate.errors import ValidateError
 from validate.identify.recorded_motion import RecordedMotion, Ringing, recorded_motion
 from validate.numbers import with_unit
-from validate.parameters import Parameter
 from validate.pipeline.bodies.first_modes import first_frequencies
 from validate.pipeline.run.method_run import MethodRun
-from validate.recording.scales import odd_scales
-from validate.recording.types import Recording
 from validate.register.observation import History
-from validate.register.signals import SignalObservation
-from validate.scene.scene import Drive, Scene
 
 Failed = Collection[str]  # quantities of checks, as force.rms
 
@@ -370,197 +361,3 @@ def explained_by(
     )  # fmt: skip
     return sentence, (Exhibit("likely-causes", "Likely causes of the difference", (),
                               tables=(table,)),)  # fmt: skip
-
-
-# --- verdict sentence of a report and of the terminal --------------------------------------------
-
-_AGAINST: dict[Kind, str] = {
-    "measured": "the measurement",
-    "twin": "a twin, a recording of another model",
-    "same law, finer mesh": "the same law on a finer mesh",
-    "same model": "a recording of the same model",
-    "reference": "the result of third-party code",
-}
-Answer = Callable[[Check], str]
-# How each answer is counted, and whether its checks are named.
-_ACCEPTANCE = {
-    "good enough": ("good enough", False),
-    "not good enough": ("not good enough", True),
-    "undecided": ("undecided", True),
-    "nothing compared": ("compared nothing", True),
-}
-_VALIDATION = {
-    "differs": ("differ from zero", True),
-    "not distinguishable": ("not distinguishable from zero", False),
-    "no answer": ("without a bound of the numerical error", True),
-    "nothing compared": ("compared nothing", True),
-    "fitted": ("fitted, no evidence", False),
-    "same model": ("of the same model, no evidence", False),
-}
-
-
-def verdict_sentence(results: tuple[MethodResult, ...], kind: Kind, *, quick: bool) -> str:
-    """Return the verdict in words: number of decided and of undecided comparisons."""
-    checked = [m for m in results if m.checks]
-    if not checked:
-        return "Nothing was compared: none of the accepted methods was run."
-    parts = [_of(m, kind) for m in checked]
-    ending = " (quick run: fewer comparisons, no published verdicts)" if quick else ""
-    found = judge_all([c for m in checked for c in m.checks])
-    return "; ".join(parts) + ending + "." + _closest(checked) + _corrected(found)
-
-
-def figures_sentence(published: tuple[Published, ...]) -> str:
-    """Which printed figures do not stand, and that those of other data are not compared."""
-    fallen = [p for p in published if p.fault]
-    foreign = sum(bool(p.other) for p in published)
-    told = [f" {len(fallen)} of {len(published)} printed figures do not hold ({_named(fallen)})."]
-    told += [f" {foreign} of {len(published)} printed figures belong to other data: not compared."]
-    return "".join(t for t, there in zip(told, (fallen, foreign), strict=True) if there)
-
-
-def _of(method: MethodResult, kind: Kind) -> str:
-    """One method: how many checks have which answer to both questions. A requirement on data that
-    calibrated or made the model is none that could be met."""
-    required = [c for c in method.checks if c.acceptance in _ACCEPTANCE]
-    told = []
-    if required:
-        told.append(_counted(required, lambda c: c.acceptance, _ACCEPTANCE, "requirements"))
-    answered = [c for c in method.checks if c.evidence or c.acceptance == "undecided"]
-    rest = [c for c in method.checks if c not in required]
-    if answered or rest:
-        told.append(_counted(answered + [c for c in rest if c not in answered],
-                             lambda c: c.validation, _VALIDATION, "checks"))  # fmt: skip
-    return f"{method.called} against {_AGAINST[kind]}: " + "; ".join(told)
-
-
-def _counted(
-    checks: Sequence[Check], answer: Answer, words: dict[str, tuple[str, bool]], what: str
-) -> str:
-    found = []
-    for key, (text, named) in words.items():
-        there = [c for c in checks if answer(c) == key]
-        if there:
-            which = f" ({_named(there)})" if named else ""
-            more = correction(there) if answer(there[0]) == "not distinguishable" else ""
-            found.append(f"{len(there)} of {len(checks)} {what} {text}{which}{more}")
-    return ", ".join(found)
-
-
-def _closest(methods: Sequence[MethodResult]) -> str:
-    """The smallest margin of all requirements that are met."""
-    met = [c for m in methods for c in m.checks if c.acceptance == "good enough"]
-    if not met:
-        return ""
-    worst = min(met, key=lambda c: (c.margin or 0.0) / (c.limit or 1.0))
-    share = 100 * (worst.margin or 0.0) / (worst.limit or 1.0)
-    margin, limit = with_unit(worst.margin, worst.unit), with_unit(worst.limit, worst.unit)
-    return f" Smallest margin: {margin} of {limit} ({share:.0f} % of the limit), {worst.name}."
-
-
-def _corrected(found: Overall) -> str:
-    """What the correction for many checks changes; nothing where none differs."""
-    if found.differs:
-        names = Counter(c.name for c in found.differs)
-        each = [f"{name} ({n} methods)" if n > 1 else name for name, n in names.items()]
-        return (
-            f" Corrected for {found.total} checks (Holm), {len(names)} still differ: "
-            f"{_listed(each)}."
-        )
-    if found.alone:
-        return (
-            f" Corrected for {found.total} checks (Holm), none differs: chance alone explains "
-            f"such differences."
-        )
-    return ""
-
-
-def _named(found: Iterable[Check | Published]) -> str:
-    return _listed([f.name for f in found])
-
-
-def _listed(names: list[str]) -> str:
-    shown = ", ".join(names[:4])
-    return shown if len(names) <= 4 else f"{shown} and {len(names) - 4} others"
-
-
-# --- plausibility of the inputs: sizes, image scales, strain, stress, modulus of soft tissue -----
-
-LENGTH = 1.0  # m: no specimen of soft tissue is as long
-MODULUS = (100.0, 10e6)  # Pa: from brain to tendon's toe
-STRESS = (1.0, 10e6)  # Pa: a hundredth of the softest, the stiffest at its own modulus
-LINEAR = 0.25  # strain: the linear law is then off by about as much
-ENTERED = 0.05  # relative: two measurements of one size differ by less
-
-
-def doubts(
-    parameters: Sequence[Parameter],
-    stated: Mapping[str, float],
-    recordings: Sequence[Recording],
-    first: MethodRun,
-) -> tuple[str, ...]:
-    """Return a sentence with the factor for everything implausible; `first` is any method that was
-    run."""
-    found = [w for p in parameters for w in _of_value(p, stated)]
-    found += [f"{r.name}: {line}" for r in recordings for line in odd_scales(r)]
-    if isinstance(first.scene, Scene) and first.scene.mesh.dimension == 3:
-        for drive in (d for d in first.scene.drives[:1] if d.point is None):
-            found += _of_compression(first.scene, drive, recordings[0], first)
-    return tuple(dict.fromkeys(found))
-
-
-def _of_value(p: Parameter, stated: Mapping[str, float]) -> Iterator[str]:
-    value = p.default
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return
-    # A plane body's thickness is no length of a specimen: 1 m stands for forces per metre.
-    if p.unit == "m" and p.path != "thickness" and p.origin != "default" and abs(value) >= LENGTH:
-        yield f"{p.path} = {value:g} m is 1000 times {value:g} mm: check its unit"
-    if p.unit == "Pa" and p.path.split(".")[-1].startswith("E"):
-        yield from _outside(f"{p.path} ({p.origin})", value, MODULUS, "modulus")
-    said = stated.get(p.path)
-    if said and value and not 1 / (1 + ENTERED) < value / said < 1 + ENTERED:
-        yield (
-            f"{p.path} = {value:g} {p.unit} was {p.origin}; the recording has {said:g} {p.unit}, "
-            f"{_times_of(value, said)}"
-        )
-
-
-def _of_compression(
-    scene: Scene, drive: Drive, recording: Recording, followed: MethodRun
-) -> Iterator[str]:
-    """Strain and stress between the driven plate and the other end, from the whole recording."""
-    along = np.ptp(scene.mesh.nodes @ np.asarray(drive.direction))
-    moved = recording.signals.get(followed.seen.drives[0].name)
-    if moved is None:
-        return
-    strain = float(np.ptp(moved.y[:, 0])) / along
-    if strain > 1:
-        yield (
-            f"{drive.name}: the recording moves by {1e3 * strain * along:.3g} mm, {strain:.3g} "
-            f"times the body's {1e3 * along:.3g} mm: check the height"
-        )
-    compared = float(np.ptp(followed.seen.inputs[:, 0])) / along
-    if scene.material.law == "linear" and compared > LINEAR:
-        yield f"strain of {compared:.3g} by a linear law, which is valid to about 0.1"
-    area = float(np.abs(scene.mesh.cell_volumes()).sum()) * scene.copies / along
-    for force in followed.seen.of(SignalObservation):
-        if force.unit == "N":
-            stress = float(np.abs(force.y).max()) / area
-            name = f"{force.quantity}: the largest over {1e6 * area:.3g} mm2"
-            yield from _outside(name, stress, STRESS, "stress")
-
-
-def _outside(name: str, value: float, within: tuple[float, float], what: str) -> Iterator[str]:
-    low, high = within
-    if not low <= value <= high:
-        end = low if value < low else high
-        yield (
-            f"{name} is a {what} of {value:.3g} Pa, {_times_of(value, end)} {end:g} Pa, the "
-            f"{'least' if value < low else 'largest'} of soft tissue: check sizes and units"
-        )
-
-
-def _times_of(value: float, other: float) -> str:
-    """How many times one is the other."""
-    return f"1/{other / value:.3g} of" if 0 < value < other else f"{value / other:.3g} times"

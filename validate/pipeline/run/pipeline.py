@@ -43,11 +43,10 @@ from validate.pipeline.checks.likely_causes import (
     Difference,
     Failed,
     difference_of,
-    doubts,
     explained_by,
-    figures_sentence,
-    verdict_sentence,
 )
+from validate.pipeline.checks.plausibility import doubts
+from validate.pipeline.checks.verdict_sentence import figures_sentence, verdict_sentence
 from validate.pipeline.exhibits.standard import (
     error_at,
     external_exhibits,
