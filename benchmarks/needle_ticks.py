@@ -28,7 +28,7 @@ from validate.pipeline.experiment.options import Options
 from validate.pipeline.experiment.tree import Built
 from validate.pipeline.live import LiveRun, RecordedPath, live, prepared, realtime
 from validate.pipeline.live.clock import quiet
-from validate.scene.tool import Needle
+from validate.scene.contact import Needle
 from validate.solve.haptic.needle import NeedleLoop, NeedleStepper
 from validate.solve.haptic.rates import DEVICE_HZ, TickTimes
 

@@ -33,7 +33,7 @@ FORMER = {
     "recording.events": "recording.clocks.events",
     "recording.formats.recorded": "recording.formats.streams",
     "register.as_declared": "register.registration",
-    "register.fitting": "register.markers.fitting",
+    "register.fitting": "register.markers.quality",
     "register.follow": "register.registration",
     "register.quality": "register.markers.quality",
     "register.registered": "register.registration",
@@ -50,7 +50,7 @@ FORMER = {
     "replay.live": "pipeline.live",
     "replay.method": "pipeline.experiment.method",
     "replay.remade": "pipeline.run.twin_record",
-    "replay.swinging_block": "pipeline.swinging_block",
+    "replay.swinging_block": "pipeline.ladder.references",
     "replay.tree": "pipeline.experiment.tree",
     "replay.variation": "pipeline.experiment.variation",
     "report.fields": "report.export.fields",
@@ -91,7 +91,7 @@ FORMER = {
     "solve.tabulated": "solve.static.load_table",
     "solve.touched_krylov": "solve.regions.krylov",
     "solve.viscous_modes": "solve.dynamic.viscous_modes",
-    "twin.stepped": "twin.time_stepping",
+    "twin.stepped": "twin.tracker",
     "twin.tracked": "twin.tracker",
 }
 

@@ -7,10 +7,10 @@ cost in force and phase, and from which size they pay, is told beside a Krylov m
 
 from validate.compare.verdict import Accept
 from validate.pipeline.experiment.experiment import Experiment, Twin
+from validate.scene.contact import Needle
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support
-from validate.scene.tool import Needle
 
 from ..async_line.probe import place
 from .block import PUSHED, record, sets, tell

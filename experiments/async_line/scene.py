@@ -1,9 +1,9 @@
 """The bar of paper 004: at nu = 0 one row of cells is a row of its 1-D elements."""
 
+from validate.scene.contact import Needle
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material
 from validate.scene.scene import Probe, Scene, Support
-from validate.scene.tool import Needle
 
 SCENE = Scene(
     body=Box(("100 mm", "2.5 mm"), cells=(40, 1), element="quad4"),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from validate.pipeline.ladder.ladder import Ladder, PaperSetting, StabilityBody, Trial, Turned
-from validate.pipeline.swinging_block import swinging_trial
+from validate.pipeline.ladder.references import swinging_trial
 from validate.recording.types import Recording
 
 from ..needle_block.body import STEP

@@ -13,8 +13,8 @@ from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
+from validate.register.markers.quality import MarkerFit
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Cone, MeshFile

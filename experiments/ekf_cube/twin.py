@@ -10,13 +10,12 @@ from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.quality import MarkerFit
 from validate.register.registration import Registered
 from validate.scene.scene import Scene
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import output_frames
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Origin, Reading
+from validate.twin.tracker import Origin, Reading, SteppedTwin
 
 _BUILT = Built(Path(__file__).parent)
 _FIDUCIALS = {

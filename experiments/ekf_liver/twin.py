@@ -16,15 +16,14 @@ from validate.pipeline.experiment.experiment import Experiment, Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.quality import MarkerFit
 from validate.register.registration import Registered
 from validate.scene.geometries.refinement import refined
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.march import output_frames
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Origin, Reading
+from validate.twin.tracker import Origin, Reading, SteppedTwin
 
 from .body import of_its_body, watched
 from .published import LIVER_FIGURES

@@ -24,9 +24,9 @@ from validate.pipeline.live import RecordedPath, as_given
 from validate.recording.types import Recording, Signal, Source
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
+from validate.scene.contact import Needle
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe, Scene
-from validate.scene.tool import Needle
 from validate.solve.haptic.loop import HapticLoop
 from validate.solve.haptic.rates import RealTime
 from validate.solve.march import march

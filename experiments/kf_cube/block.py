@@ -15,8 +15,8 @@ from validate.pipeline.experiment.experiment import Progress
 from validate.pipeline.experiment.tree import Built, TimeSteps, TrackedTwin, Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
+from validate.register.markers.quality import MarkerFit
 from validate.register.registration import Registered
 from validate.register.sensing import PoseShift
 from validate.scene.material import Region
@@ -24,8 +24,7 @@ from validate.scene.mesh import Mesh
 from validate.scene.scene import Foundation, Scene
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import output_frames
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Camera, Origin, Reading
+from validate.twin.tracker import Camera, Origin, Reading, SteppedTwin
 
 _EVERY = (0, 1, 2)
 

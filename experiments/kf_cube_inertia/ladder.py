@@ -5,7 +5,7 @@ import numpy as np
 from validate.arrays import Floats
 from validate.pipeline.experiment.tree import Built, Tree
 from validate.pipeline.ladder.ladder import Ladder, Trial, marker_noise
-from validate.pipeline.swinging_block import swinging_trial
+from validate.pipeline.ladder.references import swinging_trial
 from validate.recording.types import Recording
 
 

@@ -19,15 +19,14 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Built, TimeSteps, Tree
 from validate.pipeline.run.method_run import Truth
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.quality import MarkerFit
 from validate.register.registration import Registered
 from validate.scene.scene import Drive, Scene
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.march import output_frames
 from validate.solve.static.quasi_static import QuasiStatic
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Camera, Origin, Reading
+from validate.twin.tracker import Camera, Origin, Reading, SteppedTwin
 
 from .body import STEP
 

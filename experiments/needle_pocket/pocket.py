@@ -14,8 +14,8 @@ from validate.recording.types import Recording
 from validate.register.observation import Selection
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
+from validate.scene.contact import Needle
 from validate.scene.scene import Scene
-from validate.scene.tool import Needle
 
 from .recording import walkable
 from .scene import POCKET

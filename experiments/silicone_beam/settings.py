@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from validate.errors import UsageError
 from validate.parameters import Ranges, quantity
 from validate.pipeline.experiment.tree import Tree
-from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.quality import MarkerFit
 from validate.scene.material import Prony
 
 DATA_SET = "srl-ethz/diffPD_sim2real 825e7b7 (MIT)"

@@ -6,8 +6,8 @@ import pytest
 
 from validate.pipeline.experiment.find import find
 from validate.pipeline.experiment.options import Options, configure, folder_of
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
+from validate.register.markers.quality import MarkerFit
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 from validate.errors import RegistrationError
 from validate.recording.types import Markers
 from validate.register.markers import transform
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
 from validate.register.markers.measures import target_covariance
+from validate.register.markers.quality import MarkerFit
 from validate.register.markers.transform import (
     Similarity,
     covariance_of,

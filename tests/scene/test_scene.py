@@ -10,12 +10,12 @@ import pytest
 from phantoms import COARSE_GRID, phantom_mesh, phantom_scene
 
 from validate.errors import SceneError
+from validate.scene.contact import Needle, require_usable
 from validate.scene.geometries.box import box
 from validate.scene.geometries.specification import Box
 from validate.scene.material import Material, Region
 from validate.scene.places import Chosen, Nearest
 from validate.scene.scene import Cavity, Drive, Foundation, Pin, Scene, Support
-from validate.scene.tool import Needle, require_usable
 from validate.solve.haptic.needle import Surface
 
 

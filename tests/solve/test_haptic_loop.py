@@ -10,10 +10,10 @@ import pytest
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System, build
+from validate.scene.contact import Needle
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.scene import Drive, Scene, Support
-from validate.scene.tool import Needle
 from validate.solve.explicit.central import CentralDifference
 from validate.solve.haptic.loop import HapticLoop, HapticStepper, Hold
 from validate.solve.types import State

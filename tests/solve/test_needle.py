@@ -14,11 +14,11 @@ from experiments.fluid_phantom.square_hole import square_with_hole
 from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import build
+from validate.scene.contact import Needle
 from validate.scene.geometries.box import box
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh, boundary_facets
 from validate.scene.scene import Cavity, Drive, Scene, Support
-from validate.scene.tool import Needle
 from validate.solve.haptic.needle import NeedleLoop, NeedleStepper, Surface
 from validate.solve.march import march
 from validate.solve.types import State

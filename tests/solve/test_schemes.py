@@ -11,11 +11,10 @@ from validate.errors import SceneError
 from validate.estimate.filters import FILTERS
 from validate.fem.system import System, build
 from validate.parameters import with_values
-from validate.scene.contact import RigidContact, RigidPlane
+from validate.scene.contact import Needle, RigidContact, RigidPlane
 from validate.scene.geometries.box import box
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Drive, Load, Scene, Support
-from validate.scene.tool import Needle
 from validate.solve.dynamic.modal import Modal
 from validate.solve.handles import INSTEAD, LARGE
 from validate.solve.schemes import SCHEMES, SOLVERS, schemes_that

@@ -11,8 +11,7 @@ from validate.scene.material import Material
 from validate.scene.scene import Drive, Probe, Scene, Support
 from validate.solve.fluid.cavities import NoFluid
 from validate.solve.types import Scheme
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Camera, Origin
+from validate.twin.tracker import Camera, Origin, SteppedTwin
 
 SCENE = Scene(
     box((0.1, 0.1, 0.1), (1, 1, 1)),

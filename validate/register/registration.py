@@ -14,8 +14,8 @@ import numpy as np
 from validate.arrays import Floats, Ints
 from validate.errors import ComparisonError, RegistrationError
 from validate.recording.types import Recording
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation
+from validate.register.markers.quality import MarkerFit
 from validate.register.observation import EVERYTHING, Observation, Selection, nearest_sample
 from validate.register.outlines.outlines import OutlineObservation
 from validate.register.signals import SignalObservation

@@ -17,7 +17,7 @@ from validate.arrays import Floats, checked
 from validate.display import brief
 from validate.errors import SceneError
 from validate.parameters import known, quantity, take_units
-from validate.scene.contact import RigidContact, require_clear, standing
+from validate.scene.contact import Needle, RigidContact, require_clear, require_usable, standing
 from validate.scene.material import Material, Region
 from validate.scene.mesh import Mesh
 from validate.scene.places import (
@@ -29,7 +29,6 @@ from validate.scene.places import (
     place_of,
     resting_points,
 )
-from validate.scene.tool import Needle, require_usable
 from validate.units import SYMBOLIC
 
 # --- prescribed displacements of nodes that follow tracked points as a rigid body ----------------

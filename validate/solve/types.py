@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 from validate.arrays import Floats, Ints, checked
 from validate.display import brief
 from validate.fem.system import System
+from validate.scene.contact import Needle
 from validate.scene.scene import Scene
-from validate.scene.tool import Needle
 from validate.solve.handles import Handles
 
 Ending = Literal["finished", "diverged", "not_converged", "refused", "invalid"]

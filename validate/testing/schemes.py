@@ -9,11 +9,11 @@ import numpy as np
 
 from validate.arrays import Floats
 from validate.fem.system import System, build
+from validate.scene.contact import Needle
 from validate.scene.geometries.box import box
 from validate.scene.laws import LAWS
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Drive, Load, Scene, Support
-from validate.scene.tool import Needle
 from validate.solve.types import Scheme
 from validate.testing.pulled_cube import refusal, require, require_documented_settings
 

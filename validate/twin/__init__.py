@@ -4,8 +4,7 @@ from validate.exports import lazily, names
 
 _HOMES = {
     "sensors": ("LoadCell", "signal", "streams"),
-    "time_stepping": ("SteppedTwin",),
-    "tracker": ("Camera", "Origin", "Reading"),
+    "tracker": ("Camera", "Origin", "Points", "Reading", "SteppedTwin"),
     "ultrasound": ("Scanner",),
 }
 

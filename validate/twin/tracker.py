@@ -1,23 +1,25 @@
 """Tracker of a twin: named points, fixed fiducials, inputs and forces of a simulated motion.
 
 What a camera sees are positions in its own frame, so such a recording is registered as a measured
-one is (`register.placed`). Fiducials are points of a held face: they do not move, carry the
+one is (`MarkerObservation.placed`). Fiducials are points of a held face: they do not move, carry the
 registration, and stand in the layout beside the tracked points.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from validate.arrays import Floats, checked
+from validate.arrays import Floats, Ints, checked
 from validate.errors import RecordingError, UsageError
+from validate.fem.system import build
 from validate.recording.clocks.alignment import RECORD
 from validate.recording.types import Markers, Record, Recording, Source
 from validate.scene.scene import Scene
-from validate.solve.types import Run
+from validate.solve.march import march
+from validate.solve.types import Run, Scheme
 from validate.twin.sensors import signal, streams
 
 _AT_REST = 1e-12  # m, what counts as no displacement in the first sample
@@ -233,3 +235,56 @@ def points_of(run: Run, scene: Scene) -> Points:
 
 def _text(vector: Floats) -> str:
     return " ".join(repr(float(c)) for c in vector)
+
+
+# --- twin of a moving body: a scene solved at finer steps than the models', then tracked ---------
+
+
+@dataclass(frozen=True)
+class SteppedTwin:
+    """A scene with one input, marched by `scheme(dt)`, dt in s.
+
+    `inputs` gives (nt,) at times (nt,) s. The models take `steps` of `dt` s; the twin takes `finer`
+    steps in one of theirs.
+    """
+
+    scene: Scene
+    scheme: Callable[[float], Scheme]
+    inputs: Callable[[Floats], Floats]
+    dt: float
+    steps: int
+    finer: int = 1
+
+    def run(self, at: Ints) -> Run:
+        """Return the run at the ends of the models' steps; fields at those numbered `at` (no,)."""
+        f = self.finer
+        dt = self.dt / f
+        t: Floats = dt * np.arange(1, self.steps * f + 1, dtype=np.float64)
+        stepper = self.scheme(dt).prepare(build(self.scene))
+        run = march("twin", stepper, t, self.inputs(t)[:, None], (at + 1) * f - 1, 0.0)
+        traces = {name: replace(trace, y=trace.y[f - 1 :: f]) for name, trace in run.traces.items()}
+        return replace(run, t=run.t[f - 1 :: f], at=at, traces=traces)
+
+    def record(
+        self,
+        origin: Origin,
+        fiducials: Mapping[str, tuple[float, ...]],
+        camera: Camera,
+        reading: Callable[[Run], Mapping[str, Reading]],
+        progress: Callable[[str], None],
+    ) -> Recording:
+        """Its probes and `fiducials` (d,) m as tracked, and what is read beside them.
+
+        To what `origin` declares its modulus and Poisson ratio are added.
+        """
+        progress("simulate")
+        run = self.run(np.array([0]))
+        progress("measure")
+        material, flat = self.scene.material, 3 - self.scene.mesh.dimension
+        stiffness = {"E_Pa": repr(material.E), "nu": repr(material.nu)}
+        return replace(origin, declared={**origin.declared, **stiffness}).record(
+            points_of(run, self.scene),
+            {k: np.array([*v, *[0.0] * flat]) for k, v in fiducials.items()},
+            camera,
+            reading(run),
+        )

@@ -8,7 +8,7 @@ import numpy as np
 from validate.errors import UsageError
 from validate.parameters import Ranges, quantity, take_units
 from validate.pipeline.experiment.tree import Meshes
-from validate.register.markers.fitting import MarkerFit
+from validate.register.markers.quality import MarkerFit
 
 Pose = Literal["recorded", "declared", "fitted"]
 

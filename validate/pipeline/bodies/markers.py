@@ -13,10 +13,9 @@ from validate.recording.readers import recognised
 from validate.recording.types import Markers, Recording
 from validate.register.clocks import clock_sd
 from validate.register.markers.displacements import noise, rested
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation, vector
 from validate.register.markers.measures import FEWEST
-from validate.register.markers.quality import as_declared
+from validate.register.markers.quality import MarkerFit, as_declared
 from validate.register.observation import nearest_sample
 from validate.register.outlines.image_plane import SurfaceSampler, section
 from validate.register.outlines.outlines import OutlineObservation, enclosed

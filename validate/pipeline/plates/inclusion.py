@@ -23,8 +23,8 @@ from validate.pipeline.experiment.method import Method
 from validate.pipeline.experiment.tree import Tree, beside, changed_by
 from validate.recording.types import Contours, Recording, Signal
 from validate.register.clocks import clock_sd
-from validate.register.markers.fitting import MarkerFit
 from validate.register.markers.markers import MarkerObservation, Sampling, Together
+from validate.register.markers.quality import MarkerFit
 from validate.register.observation import nearest_sample
 from validate.register.outlines.image_plane import SurfaceSampler, outlined_capsule
 from validate.register.outlines.outlines import Corner, OutlineObservation

@@ -12,8 +12,7 @@ from validate.errors import RegistrationError
 from validate.fem.assembly.locate import Rows, nearest_node_rows, require_inside
 from validate.recording.types import Markers, Recording
 from validate.register.clocks import SAME, clock_sd, interpolated, slopes, with_clock
-from validate.register.markers.fitting import MarkerFit
-from validate.register.markers.quality import LINE, Registration
+from validate.register.markers.quality import LINE, MarkerFit, Registration
 from validate.register.markers.transform import spread
 from validate.register.observation import (
     AnyDraw,

@@ -13,15 +13,15 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Self, get_args
+from typing import Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from validate.arrays import Floats, checked, rms
 from validate.errors import RegistrationError
+from validate.parameters import quantity
 from validate.register.markers import measures
-from validate.register.markers.fitting import Method
 from validate.register.markers.measures import (
     FEWEST,
     Fit,
@@ -42,6 +42,29 @@ from validate.register.markers.transform import (
     spread,
     weighted_covariance,
 )
+
+# --- settings of the fit of markers to their layout ----------------------------------------------
+
+Method = Literal["rigid", "similarity", "two_step", "two_step_scaled"]
+
+
+@dataclass(frozen=True)
+class MarkerFit:
+    """Fitted once, on the rest state. What is left out of the fit is compared like any other."""
+
+    method: Method = quantity("rigid", "1", "marker registration, on the rest state only")
+    sd: tuple[float, ...] = quantity(
+        (), "m", "noise of a marker along each axis of the tracker's frame; none: as recorded"
+    )
+    exclude: tuple[str, ...] = quantity((), "1", "markers left out of the fit, still compared")
+    robust: bool = quantity(False, "1", "leave outliers out of the fit, still compared")
+
+    def noise(self, recorded: float) -> float | tuple[float, ...]:
+        """Return the noise m that is used: one for all axes, or one for each."""
+        return self.sd if len(self.sd) > 1 else (*self.sd, recorded)[0]
+
+
+# --- registration of named markers: fit, quality, and suspicious points --------------------------
 
 LINE = 3.0  # spread across the markers' line, over the noise, that a rotation about it needs
 

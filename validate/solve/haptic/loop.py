@@ -34,9 +34,9 @@ from validate.fem.critical import CriticalStep
 from validate.fem.large_strain.explicit import ExplicitMotion
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.scene.contact import Needle
 from validate.scene.places import nodes_of
 from validate.scene.scene import Scene
-from validate.scene.tool import Needle
 from validate.solve.explicit.central import CentralDifference, CentralStepper, Damping, Past
 from validate.solve.handles import LARGE, Handles, require_handled
 from validate.solve.types import State

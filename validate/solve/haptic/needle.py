@@ -26,10 +26,10 @@ from validate.fem.kernels.jit_cache import compiled
 from validate.fem.linear_solvers.condense import Condensed, Imposed, WorkingSet, along, between
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.scene.contact import Needle
 from validate.scene.places import facets_of
 from validate.scene.scene import Scene
 from validate.scene.shape_functions import simplex_values
-from validate.scene.tool import Needle
 from validate.solve.fluid.pressure_curve import RATIOS, Root, cubic, pressure_of, root_of
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.rates import DEVICE_HZ

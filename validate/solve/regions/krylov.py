@@ -21,8 +21,8 @@ from validate.errors import SceneError
 from validate.fem.linear_solvers.factor import Factor, Fronts, factorise
 from validate.fem.system import System
 from validate.parameters import quantity
+from validate.scene.contact import Needle
 from validate.scene.scene import Scene
-from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.loop import SpringProbe
 from validate.solve.regions.body import RegionBody, require_one_probe

@@ -21,9 +21,9 @@ from validate.arrays import Floats
 from validate.errors import SceneError
 from validate.fem.system import System
 from validate.parameters import part, quantity
+from validate.scene.contact import Needle
 from validate.scene.material import LawName, Prony
 from validate.scene.scene import Scene
-from validate.scene.tool import Needle
 from validate.solve.handles import Handles, require_handled
 from validate.solve.haptic.loop import Hold, SpringProbe
 from validate.solve.regions.body import (

@@ -22,8 +22,7 @@ from validate.scene.scene import Load, Probe, Scene, Support
 from validate.solve.dynamic.implicit import NewtonDynamics
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.march import output_frames
-from validate.twin.time_stepping import SteppedTwin
-from validate.twin.tracker import Origin, Reading
+from validate.twin.tracker import Origin, Reading, SteppedTwin
 
 LARGE = {
     "material.law": "gent",
