@@ -43,8 +43,8 @@ KINDS = {
         ".iter_messages(log_time_order=False))",
     ),
     "inspect": _MEASURE.format(
-        load="from validate.recording.preflight import inspect_recording",
-        count="inspect_recording(path).messages",
+        load="from validate.recording.preflight import Inspection",
+        count="Inspection.of(path).messages",
     ),
     "sha256": _MEASURE.format(
         load="import hashlib", count="len(hashlib.sha256(path.read_bytes()).digest())"

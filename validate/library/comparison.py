@@ -103,7 +103,7 @@ def compare(
 
     `methods` and `scores` are patterns, as `["kf_*"]` and `["*.rms@9mm"]`. `sort` is "change",
     "difference", "score", "method" or "stored". To simulate and compare with a recording use
-    `validate.run`; to compare fields of two meshes, `validate.compare.compare_fields`.
+    `validate.run`; to compare fields of two meshes, `validate.compare.FieldScores`.
 
     Raises `UsageError` for fewer than two runs and for a folder without a run, `ComparisonError`
     where no score is shared.

@@ -2,8 +2,8 @@
 
 Every law has the Young's modulus and Poisson ratio of its material at small strain; what is left
 over is given here as the field writes it. C10 of Mooney-Rivlin and Yeoh and mu_1 of Ogden follow:
-2 (C10 + C01) = 2 C10 = mu, sum of mu_p alpha_p = 2 mu. `scene.rubber` makes materials of published
-coefficients. The forms are in `fem`, written out in docs/explanation/laws.md.
+2 (C10 + C01) = 2 C10 = mu, sum of mu_p alpha_p = 2 mu. `Material.ogden` and others make them of
+published coefficients. The forms are in `fem`, written out in docs/explanation/laws.md.
 """
 
 from collections.abc import Callable

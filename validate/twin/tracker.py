@@ -1,8 +1,8 @@
 """Tracker of a twin: named points, fixed fiducials, inputs and forces of a simulated motion.
 
 What a camera sees are positions in its own frame, so such a recording is registered as a measured
-one is (`MarkerObservation.placed`). Fiducials are points of a held face: they do not move, carry the
-registration, and stand in the layout beside the tracked points.
+one is (`MarkerObservation.placed`). Fiducials are points of a held face: they do not move, carry
+the registration, and stand in the layout beside the tracked points.
 """
 
 from collections.abc import Callable, Mapping

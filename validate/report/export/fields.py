@@ -1,7 +1,7 @@
 """NetCDF-4 files of fields and traces, one per method and recording, read back by xarray.
 
-from validate.report import open_fields
-u = open_fields("reports/silicone_beam", "newmark").u  # (frame, node, axis), m
+import validate
+u = validate.open_run("silicone_beam").to_xarray("newmark").u  # (frame, node, axis), m
 """
 
 from collections.abc import Iterator
