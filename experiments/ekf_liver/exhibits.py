@@ -2,12 +2,14 @@
 
 import numpy as np
 
+from validate.arrays import Floats
 from validate.compare.exhibit import Entry, Exhibit, NumberTable
 from validate.fem.critical import CriticalStep
 from validate.fem.system import build as build_system
 from validate.pipeline.experiment.experiment import Progress, ReportAdditions
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.method_run import Cases, MethodRun
+from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
 from ..ekf_cube.published import PRINTED_LIVER_STEP
@@ -103,11 +105,16 @@ def _ramp_words(plain: MethodRun, readings: NumberTable) -> str:
     )
 
 
-def _sliver_words(scene: Scene) -> str:
-    x = scene.mesh.nodes[scene.mesh.corners]
+def altitudes(mesh: Mesh) -> Floats:
+    """Least altitude m of every tetrahedron (e,)."""
+    x = mesh.nodes[mesh.corners]
     slopes = np.linalg.inv(x[:, 1:] - x[:, :1])  # of the shape functions of all corners but one
     slopes = np.concatenate([-slopes.sum(axis=2, keepdims=True), slopes], axis=2)
-    flat = 1 / np.linalg.norm(slopes, axis=1).max(axis=1)
+    return np.asarray(1 / np.linalg.norm(slopes, axis=1).max(axis=1))
+
+
+def _sliver_words(scene: Scene) -> str:
+    flat = altitudes(scene.mesh)
     count = int((flat < _SLIVER * np.median(flat)).sum())
     return (
         f"{count} of {len(flat)} cells are slivers (altitude below {_SLIVER:g} of the median "

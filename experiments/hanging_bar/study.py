@@ -40,6 +40,7 @@ def trial(recording: Recording, tree: Tree, quick: bool) -> Trial:
         build=build,
         size=lambda level: size[0] / level,
         meshes={"P1": levels, "P2": two, "H8": levels, _REFERENCE: fewer},
+        orders={"P1": 2.0, "P2": 3.0, "H8": 2.0, _REFERENCE: 2.0},
         steps=(_WHOLE,),
         inputs=weight,
         frames=np.array([_WHOLE]),

@@ -179,3 +179,17 @@ def test_the_common_mesh_assembles_once_over_many_frames() -> None:
     common = Common(scene.mesh, scene)
     first, second = pair(run, reference, common), pair(reference, run, common)
     assert first.common.K is second.common.K
+
+
+def test_units_of_metrics_have_the_dimension() -> None:
+    assert [FieldScores.units(d)["E_i"] for d in (2, 3)] == ["m^2", "m^3"]
+    assert FieldScores.units(2)["E_n"] == "1"
+
+
+def test_earlier_scores_stand_for_their_mesh() -> None:
+    """So that its matrices are made once for all frames."""
+    run, reference, scene = on(box((1.0, 1.0), (2, 2)))
+    first = FieldScores.of(run, reference, scene, ("E_n",))
+    again = FieldScores.of(run, reference, first, ("E_n",))
+    assert again.pair.common is first.pair.common
+    assert again.scores == first.scores

@@ -13,6 +13,7 @@ from experiments.ekf_liver.body import (
     watched,
     with_sets,
 )
+from experiments.ekf_liver.exhibits import altitudes
 from experiments.ekf_liver.ladder import LIVER_LADDER
 from validate.datasets.home import SHARED
 from validate.errors import RecordingError, SceneError
@@ -167,3 +168,15 @@ def test_the_ladders_bodies_are_coarser_and_whole() -> None:
 def test_the_liver_has_no_similar_meshes() -> None:
     with pytest.raises(SceneError, match="no similar meshes"):
         LiverBody().scaled(0.5)
+
+
+def test_the_least_altitude_is_that_of_three_volumes_over_an_area() -> None:
+    """Also where it stands on the face opposite to the first corner."""
+    mesh = generated_liver((3, 3, 3))
+    x = mesh.nodes[mesh.corners]
+    faces = [np.delete(x, k, axis=1) for k in range(4)]
+    areas = [
+        np.linalg.norm(np.cross(f[:, 1] - f[:, 0], f[:, 2] - f[:, 0]), axis=1) / 2 for f in faces
+    ]
+    assert {int(k) for k in np.argmax(areas, axis=0)} >= {0, 1}
+    assert altitudes(mesh) == pytest.approx(3 * mesh.cell_volumes() / np.max(areas, axis=0))

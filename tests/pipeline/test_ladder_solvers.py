@@ -1,13 +1,18 @@
 """The rivals of a ladder: which of them depend on the step, and where they run."""
 
+import numpy as np
 import pytest
 
+from validate.arrays import rms
+from validate.fem.assembly.locate import Rows
+from validate.pipeline.ladder.ladder import ORDERS
 from validate.pipeline.ladder.references import (
     exact_in_ramps,
     exact_in_time,
     still_best,
     swinging_pair,
 )
+from validate.scene.geometries.box import box, grid
 from validate.solve.fluid.cavities import ExactPressure
 from validate.solve.schemes import SCHEMES
 from validate.solve.static.quasi_static import QuasiStatic
@@ -52,3 +57,17 @@ def test_the_most_exact_solver_of_each_kind() -> None:
     assert (exact_in_time(0.1).propagate, exact_in_ramps(0.1).propagate) == ("constant", "linear")
     assert exact_in_time(0.1).modes == exact_in_ramps(0.1).modes == 60
     assert swinging_pair("P1", 2, 0.1).declared(0.3).dt == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("element", ["P1", "P2", "H8"])
+def test_the_declared_order_is_that_of_interpolation(element: str) -> None:
+    """Of a smooth field, from one mesh to the next, in the mean over points within the cells."""
+    points = np.random.default_rng(2).uniform(0.05, 0.95, (400, 3))
+    errors = []
+    for n in (4, 8):
+        mesh = grid((1.0,) * 3, (n,) * 3) if element == "H8" else box((1.0,) * 3, (n,) * 3)
+        mesh = mesh.quadratic() if element == "P2" else mesh
+        known = np.sin(mesh.nodes @ [1.0, 2.0, 1.5])[:, None] * np.ones(3)
+        off = Rows.barycentric(mesh, points).apply(known)[:, 0] - np.sin(points @ [1.0, 2.0, 1.5])
+        errors.append(rms(off[:, None]))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(ORDERS[element], abs=0.25)

@@ -490,6 +490,9 @@ def test_a_tip_recorded_at_different_times_is_refused() -> None:
         RecordedPath.of(recording, 2)
     with pytest.raises(RecordingError, match=r"tip.x, tip.y.*'tip'"):
         RecordedPath.of(replace(recording, signals={"a": signal(t)}), 2)
+    known = replace(signal(t), sd=2e-4)
+    path = RecordedPath.of(replace(recording, signals={"tip.x": signal(t), "tip.y": known}), 2)
+    assert (path.x.shape, path.sd) == ((3, 2), 2e-4)
 
 
 def test_a_path_that_does_not_begin_at_rest_has_rest_a_tick_before() -> None:

@@ -7,7 +7,7 @@ from experiments.stylus_phantom.touched_landmarks import tip_path
 from validate.arrays import Floats
 from validate.errors import RegistrationError
 from validate.register.markers.transform import Similarity
-from validate.register.tools.landmarks import Dwell, _joined, match_landmarks, sd_of_mean
+from validate.register.tools.landmarks import Digitised, Dwell, _joined, match_landmarks, sd_of_mean
 
 # private: _joined: spans of a known gap.
 
@@ -134,3 +134,13 @@ def test_a_short_disturbance_parts_no_dwell() -> None:
 def test_more_places_than_can_be_landmarks_are_refused() -> None:
     with pytest.raises(RegistrationError, match=r"61 places for 7 landmarks.*most 60"):
         match_landmarks(ODD, np.zeros((61, 3)), 2e-3)
+
+
+def test_landmarks_along_another_path_have_its_places_and_its_scatter() -> None:
+    noise = np.random.default_rng(8).normal(0, 0.1e-3, (20 * len(BOX), 3))
+    t, x = path(*(still(place, 20) for place in BOX))
+    stood = Dwell.of_path(t, x + noise, 3e-3, 1.0)
+    found = Digitised.of(t, x + noise, stood, stood, tuple("abcdefgh"), BOX, 2e-3)
+    other = found.along(x + [0.01, 0.0, 0.0] + 3 * noise)
+    assert other.places == pytest.approx(BOX + [0.01, 0.0, 0.0], abs=0.3e-3)
+    assert other.sd == pytest.approx(3 * found.sd, rel=1e-6)
