@@ -64,30 +64,24 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
         if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
             say(f"left out: {what}; --all, --method, --score or --json show them")
     if out or not as_json:
-        page = _drawn(found, paths, wanted, out)
-        if page and not as_json:
-            say(f"charts and all scores: {relative(page)}")
-
-
-def _drawn(
-    found: SideBySide, paths: tuple[Path, ...], wanted: Shown, out: Path | None
-) -> Path | None:
-    """The page below `out`, else beside the first run; none, and a line, where that is closed."""
-    beside = paths[0].resolve()
-    beside = (beside if beside.is_dir() else beside.parent).parent
-    # One folder for one comparison: of these runs, filtered and sorted so
-    first = found.runs[0].name.partition("+")[0]
-    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
-    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
-    folder = (out or beside) / f"compare-{first[:60]}-{mark}"
-    try:
-        try_results(folder, ())
-    except UsageError as error:
-        if out:
-            raise
-        complain(f"no charts: {error}")
-        return None
-    return write_comparison(found, document(found), folder)
+        # A page below `out`, else beside the first run: one folder for one comparison, which is of
+        # these runs, filtered and sorted so
+        beside = paths[0].resolve()
+        beside = (beside if beside.is_dir() else beside.parent).parent
+        first = found.runs[0].name.partition("+")[0]
+        settings = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
+        mark = sha256(json.dumps(settings).encode()).hexdigest()[:6]
+        folder = (out or beside) / f"compare-{first[:60]}-{mark}"
+        try:
+            try_results(folder, ())
+        except UsageError as error:
+            if out:
+                raise
+            complain(f"no charts: {error}")
+        else:
+            page = write_comparison(found, document(found), folder)
+            if not as_json:
+                say(f"charts and all scores: {relative(page)}")
 
 
 def _headline(found: SideBySide) -> str:
@@ -110,24 +104,19 @@ def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[
     for i, pair in enumerate(shown[:count]):
         title = wrapped(f"One: {pair.one}; other: {pair.other}", columns, "  ")
         room = None if most is None else (most - len(lines)) // (count - i) - len(title) - 1
-        found, held = _fitting(pair, columns, room)
-        lines += [*title, *found, ""]
-        rows += held
+        # The first rows of the pair that have room, at least one
+        head, cells = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
+        if any(r.method for r in pair.rows):
+            head = ["method", *head]
+            cells = [[r.method, *row] for r, row in zip(pair.rows, cells, strict=True)]
+        fitting = len(cells) if room is None else min(len(cells), max(1, room - 1))
+        table = laid(head, cells[:fitting], columns)
+        while room is not None and len(table) > room and fitting > 1:
+            fitting -= 1
+            table = laid(head, cells[:fitting], columns)
+        lines += [*title, *table, ""]
+        rows += fitting
     return lines, rows, count
-
-
-def _fitting(pair: Pair, columns: int, room: int | None) -> tuple[list[str], int]:
-    """The first rows of a pair that have room, at least one; and how many."""
-    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
-    if any(r.method for r in pair.rows):
-        head = ["method", *head]
-        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
-    count = len(rows) if room is None else min(len(rows), max(1, room - 1))
-    lines = laid(head, rows[:count], columns)
-    while room is not None and len(lines) > room and count > 1:
-        count -= 1
-        lines = laid(head, rows[:count], columns)
-    return lines, count
 
 
 def _row(row: Row) -> list[str]:

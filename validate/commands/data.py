@@ -18,7 +18,12 @@ def show(as_json: bool) -> None:
     rows = []
     for s in data_sets():
         size = f"{len(s.files)}, {sum(f.size for f in s.files) / 1e6:.2g} MB"
-        rows.append([s.name, s.title, s.licence, size, _state(s)])
+        place, count = max(_counts(s).items(), key=lambda found: found[1])
+        if not count:
+            here = "no" if s.brought else "no; not downloadable"
+        else:
+            here = relative(place) if count == len(s.files) else f"{count} in {relative(place)}"
+        rows.append([s.name, s.title, s.licence, size, here])
     table("", ["name", "what", "licence", "files", "here"], rows)
     say("\n`validate data get NAME` downloads one; the licence of each applies.")
 
@@ -67,13 +72,6 @@ def _counts(data_set: DataSet) -> dict[Path, int]:
 def _where(data_set: DataSet) -> Path | None:
     whole_in = (p for p, n in _counts(data_set).items() if n == len(data_set.files))
     return next(whole_in, None)
-
-
-def _state(data_set: DataSet) -> str:
-    place, count = max(_counts(data_set).items(), key=lambda found: found[1])
-    if not count:
-        return "no" if data_set.brought else "no; not downloadable"
-    return relative(place) if count == len(data_set.files) else f"{count} in {relative(place)}"
 
 
 def _document(data_set: DataSet) -> dict[str, Any]:

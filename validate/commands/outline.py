@@ -15,14 +15,13 @@ from validate.places import try_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.outlines.outline import (
     EXPERTS,
-    FollowedOutline,
     Hint,
     RivalRegion,
     followed,
 )
 from validate.recording.outlines.third_party_outlines import foreign_outlines
 from validate.recording.readers import read_recording
-from validate.recording.types import Contours, Frames, Recording
+from validate.recording.types import Contours, Frames
 from validate.report.charts.style import png
 from validate.report.scenes.outline_images import PlaceSaid, outlines_over
 from validate.report.sections.observations import Held
@@ -37,9 +36,21 @@ def outline(
 ) -> None:
     """Add the outlines of the images `topic` to the recording in `file` as the stream `name`."""
     recording = read_recording(file)
-    out = out or _same(file, recording)
+    if out is None:
+        if recording.unread:  # not a stream here: it would be lost in the same file
+            raise UsageError(
+                f"{file.name} has {len(recording.unread)} topics that are not read and would be "
+                "lost: write to another file, -o OUT.mcap"
+            )
+        out = file
     try_file(out)
-    images = topic or _only(recording)
+    if not topic and len(recording.frames) != 1:
+        raise UsageError(
+            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
+            if recording.frames
+            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
+        )
+    images = topic or next(iter(recording.frames))
     frames = recording.frame(images)
     # Outlines that this command made may be made again
     if name in recording.streams and f"found/{name}" not in recording.metadata:
@@ -61,26 +72,6 @@ def outline(
     )
 
 
-def _same(file: Path, recording: Recording) -> Path:
-    """The recording itself, unless that would lose what is no stream here."""
-    if recording.unread:
-        raise UsageError(
-            f"{file.name} has {len(recording.unread)} topics that are not read and would be "
-            "lost: write to another file, -o OUT.mcap"
-        )
-    return file
-
-
-def _only(recording: Recording) -> str:
-    if len(recording.frames) != 1:
-        raise UsageError(
-            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
-            if recording.frames
-            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
-        )
-    return next(iter(recording.frames))
-
-
 def _found(
     frames: Frames, images: str, given: dict[str, Any]
 ) -> tuple[Contours, dict[str, str], tuple[PlaceSaid, ...]]:
@@ -89,8 +80,8 @@ def _found(
             raise UsageError(f"--{option} is for third-party outlines; give it with --from FILE")
     hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
                 given["shape"], given["bright"])  # fmt: skip
-    with progress("outlines") as told:
-        found = followed(frames, hint, images, told, given["confidence"])
+    with progress("outlines") as report:
+        found = followed(frames, hint, images, report, given["confidence"])
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
@@ -110,10 +101,6 @@ def _found(
         marks = []
     others = (*found.rivals, *found.beside)
     marks += [PlaceSaid("another region", r.centre, r.radius) for r in others]
-    return found.contours, _told(found, hint), tuple(marks)
-
-
-def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
     sd, c = found.contours.sd, found.confidence
     assert found.contours.each is not None
     own = 1e3 * found.contours.each[:, 0]
@@ -130,7 +117,7 @@ def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
         told["near the given centre"] = _named(found.beside)
     if found.without:
         told["left out"] = ", ".join(map(str, found.without))
-    return told
+    return found.contours, told, tuple(marks)
 
 
 def _named(regions: tuple[RivalRegion, ...]) -> str:

@@ -51,14 +51,23 @@ def show_run(
     # What the recording is and what was chosen on it, where that limits what the verdict says
     texts = [] if result.kind == "measured" else [f"Recording: {KINDS[result.kind]}."]
     texts += [f"{m.name}: {m.chosen}." for m in result.methods if m.checks and m.chosen]
+    moved = [f"the verdict changed: {m.words}" for m in result.moved] if result.expected else []
+    findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
+    warnings = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
+    # Name, value with half of its 95 % interval, and the method, a line each
+    identified = []
+    for v in result.identified_values:
+        low, high = v.interval
+        value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
+        identified.append([v.name, f"{value} ± {half}", f"by {v.by}"])
     show(
         (
             sentences([headline(result)], None),
             sentences(texts, None),
-            sentences(_warnings(result), keep=2, most=4),
+            sentences((f"warning: {text}" for text in warnings), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
             sentences(_unfinished(result), keep=2, most=4),
-            Passage("Identified, with 95 % intervals", _identified(result), 1, 4),
+            Passage("Identified, with 95 % intervals", rows([""] * 3, identified), 1, 4),
             Passage(causes, () if verbose else _causes(result), 2, 4),
             *([ranking] if ranking else []),
             figures_line([figure_members(p) for p in result.published], name),
@@ -75,8 +84,8 @@ def show_run(
         for method in result.methods:
             for words in dict.fromkeys(w for r in method.runs for w in r.said):
                 say(f"{method.name}: {words}", indent="  ")
-        for value in result.identified_values:
-            say(f"{sentence(value)}.", indent="  ")
+        for v in result.identified_values:
+            say(f"{sentence(v)}.", indent="  ")
         say(f"\n{result.sentence}")
         say(end)
 
@@ -115,13 +124,6 @@ def _checks(result: Result) -> list[Json]:
     return [{"method": m.name, **check_members(c)} for m in result.methods for c in m.checks]
 
 
-def _warnings(result: Result) -> list[str]:
-    moved = [f"the verdict changed: {m.words}" for m in result.moved] if result.expected else []
-    findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
-    texts = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
-    return [f"warning: {text}" for text in texts]
-
-
 # --- methods --------------------------------------------------------------------------------------
 
 
@@ -145,16 +147,6 @@ def _causes(result: Result) -> tuple[str, ...]:
     first = [r for r in every if r[:2] == every[0][:2]]
     cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
     return rows([""] * 3, cells, soft=2)
-
-
-def _identified(result: Result) -> tuple[str, ...]:
-    """Name, value with half of its 95 % interval, and the method, a line each."""
-    cells = []
-    for v in result.identified_values:
-        low, high = v.interval
-        value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
-        cells.append([v.name, f"{value} ± {half}", f"by {v.by}"])
-    return rows([""] * 3, cells)
 
 
 def _ranking(result: Result) -> Passage | None:

@@ -187,7 +187,12 @@ def geometry_of(found: Answers, cells: int, order: int, reach: float = -1.0) -> 
     bricks = found.get("seen.outline", NONE) == NONE
     kind: Any = ("hex" if bricks else "tet") + str({(1, 1): 8, (1, 2): 27, (0, 1): 4, (0, 2): 10}[
         (int(bricks), order)])  # fmt: skip
-    n = divided(_ideal(sizes, cells), _even(found, sizes))
+    even: tuple[bool, ...] = ()
+    if found.get("held.slides") and len(sizes) == 3:
+        # Every grid has a middle in the plane of the place that it rests on: that middle stays
+        across = _across(found["held.slides"], Box(sizes, (1, 1, 1), "hex8").resolved(Path()))
+        even = tuple(c != across for c in range(3))
+    n = divided(_ideal(sizes, cells), even)
     if len(sizes) == 3:
         return Box(sizes, n, kind)
     return Cylinder(sizes[0], sizes[1], (n[0], n[1]), kind)
@@ -218,15 +223,6 @@ def _ideal(lengths: tuple[float, ...], along: int) -> tuple[float, ...]:
     while edge < cubes and grid_unknowns(cells(edge), round_=round_) > _UNKNOWNS:
         edge = min(1.1 * edge, cubes)
     return cells(edge)
-
-
-def _even(found: Answers, lengths: tuple[float, ...]) -> tuple[bool, ...]:
-    """Axes of a block along which every grid has a middle: in the plane of a place that it rests
-    on, whose middle stays. A cylinder has an axis."""
-    if not found.get("held.slides") or len(lengths) == 2:
-        return ()
-    across = _across(found["held.slides"], Box(lengths, (1, 1, 1), "hex8").resolved(Path()))
-    return tuple(c != across for c in range(3))
 
 
 def _across(place: str, mesh: Mesh) -> int:

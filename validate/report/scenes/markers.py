@@ -207,7 +207,9 @@ def _across_panels(
         for method, look in drawn:
             own = markers_seen(method)
             assert own is not None
-            line = _banded(x, _MM * own.positions.apply(method.run.u[seen.frames[i]])[:, c])
+            y = _MM * own.positions.apply(method.run.u[seen.frames[i]])[:, c]
+            groups = np.array_split(np.argsort(x, kind="stable"), min(_BANDS, len(x)))
+            line = np.array([x[g].mean() for g in groups]), np.array([y[g].mean() for g in groups])
             ax.plot(*line, color=look.colour, ls=look.dash, lw=look.width, marker=look.point, ms=4,
                     label=method.label)  # fmt: skip
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
@@ -220,9 +222,3 @@ def _across_panels(
 def _across_height(seen: _Seen, drawn: list[tuple[MethodResult, Style]]) -> float:
     names = ["measured", *(m.label for m, _ in drawn)]
     return 2.2 * -(-len(seen.loaded) // 2) + 0.6 + legend_height(names)
-
-
-def _banded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Means over groups of neighbours in x."""
-    groups = np.array_split(np.argsort(x, kind="stable"), min(_BANDS, len(x)))
-    return np.array([x[g].mean() for g in groups]), np.array([y[g].mean() for g in groups])
