@@ -49,6 +49,8 @@ def parquet_head(data: bytes) -> str:
 def parquet_rows(data: bytes, labels: Mapping[str, Wanted]) -> list[LongRow]:
     """Return the rows whose columns fit; row groups without any are not decoded as a whole."""
     file, rows = _opened(data), []
+    import pyarrow as pa
+
     for i in range(file.num_row_groups):
         kept = np.ones(file.metadata.row_group(i).num_rows, dtype=bool)
         for name, wanted in labels.items():
@@ -61,8 +63,6 @@ def parquet_rows(data: bytes, labels: Mapping[str, Wanted]) -> list[LongRow]:
         if kept.any():
             found = file.read_row_group(i, columns=list(LongRow._fields), use_threads=False)
             # The mask as pyarrow has it, by its bits: `pyarrow.array` would import pandas (42 MB)
-            import pyarrow as pa
-
             bits = pa.py_buffer(np.packbits(kept, bitorder="little"))
             found = found.filter(pa.Array.from_buffers(pa.bool_(), len(kept), [None, bits]))
             columns = [found.column(name).to_pylist() for name in LongRow._fields]

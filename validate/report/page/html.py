@@ -294,8 +294,9 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     apart = len({d.series.name for d in drawable}) <= _NAMES
     for drawn in drawable:
         of, jagged = drawn.series.label, is_jagged(drawn.series) and not drawn.one_of
+        dash = "-" if jagged else drawn.look.dash
         look = {"label": drawn.series.name if apart else of, "colour": drawn.look.colour,
-                "dash": [] if jagged else _dash(drawn.look.dash),
+                "dash": [] if dash == "-" else [3 * float(length) for length in dash[1]],
                 "width": 0.9 if jagged else drawn.look.width or 1.0,
                 "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
         style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
@@ -313,10 +314,6 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _dash(given: Any) -> list[float]:
-    return [] if given == "-" else [3 * float(length) for length in given[1]]
-
-
 def _ways(x: Floats) -> list[Ints]:
     """Indices of the parts of x (k,) between its turns, each in rising x; neighbours share ends."""
     sense = np.sign(np.diff(x))
@@ -330,22 +327,18 @@ def _ways(x: Floats) -> list[Ints]:
 def _points(
     series: Series, order: Ints, least: float
 ) -> tuple[list[float | None], dict[str, list[float | None]]]:
-    keep = order[_peaks(series.y[order])]
+    keep = order
+    if len(order) > _MOST:  # the lowest and the highest of equal parts, and both ends
+        y = series.y[order]
+        parts = np.array_split(np.arange(len(y)), _MOST // 2)
+        peaks = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
+        keep = order[np.unique([0, *peaks, len(y) - 1])]
     columns = {"y": series.y} | ({} if series.upper is None else {"upper": series.upper})
     found = {
         name: _numbers(np.where(least and y[keep] < least, np.nan, y[keep]), _SHOWN)
         for name, y in columns.items()
     }
     return _numbers(series.x[keep]), found
-
-
-def _peaks(y: Floats) -> Ints:
-    """Indices of the lowest and the highest of equal parts of y (k,), and of both ends."""
-    if len(y) <= _MOST:
-        return np.arange(len(y))
-    parts = np.array_split(np.arange(len(y)), _MOST // 2)
-    found = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
-    return np.unique([0, *found, len(y) - 1])
 
 
 def _numbers(values: Floats, digits: int = _DIGITS) -> list[float | None]:

@@ -31,13 +31,12 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.recording.mcap.protobuf_messages import protobuf_schema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL, Json
 from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
 from validate.report.replay import foxglove
-from validate.report.replay.foxglove import CLOUD, IMAGE, SCENE, Rgba
+from validate.report.replay.foxglove import CLOUD, IMAGE, SCENE
 from validate.report.replay.space import (
     COLOURS,
     images,
@@ -65,12 +64,21 @@ def write_replay(result: Result, path: Path) -> None:
 
     Without recordings it holds metadata only, and has no layout.
     """
+    inputs = {
+        INPUT + (prefix[1:] or r.name): {
+            "path": file_name(r.source.path),
+            "sha256": r.source.sha256,
+            "bytes": str(r.source.bytes),
+            "integrity": r.source.integrity,
+        }
+        for r, prefix in zip(result.recordings, _prefixes(result), strict=True)
+    }
     coarse = 1
     while True:
         shown = [(view, tracks(view)) for view in views(result, coarse)]
         found = tuple(t for _, tracks in shown for t in tracks)
         channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
-        metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
+        metadata = {RECORD: _record(result, found, coarse), **inputs}
         metadata |= {name: values for t in found for name, values in t.records}
         write_channels(path, channels, _in_time(found), metadata)
         if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
@@ -135,6 +143,7 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
     thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
     if coarse > 1:
         thinned.append(f"interpolated instants: one in {coarse}")
+    frames_alone = any(over_time(view) for view in views(result))
     return {
         "format": "1",
         "experiment": result.name,
@@ -142,16 +151,12 @@ def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, st
         "method_label": method.label if method else "",
         "quick": "yes" if result.quick else "no",
         "kind": result.kind,
-        "interpolated": _interpolated(result),
+        "interpolated": "nothing: output frames keep their times"
+        if frames_alone
+        else f".../simulated/scene and points: {HOW}",
         "thinned": "; ".join(thinned) or "nothing",
         "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
     }
-
-
-def _interpolated(result: Result) -> str:
-    if any(over_time(view) for view in views(result)):
-        return "nothing: output frames keep their times"
-    return f".../simulated/scene and points: {HOW}"
 
 
 def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
@@ -170,19 +175,6 @@ def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track
         yield "all but numbers: Foxglove's stamps end in 2106"
     if method.scene.mesh.dimension != 3:
         yield "surface: the mesh is planar"
-
-
-def _inputs(result: Result) -> dict[str, dict[str, str]]:
-    prefixes = _prefixes(result) if result.recordings else []
-    return {
-        INPUT + (prefix[1:] or r.name): {
-            "path": file_name(r.source.path),
-            "sha256": r.source.sha256,
-            "bytes": str(r.source.bytes),
-            "integrity": r.source.integrity,
-        }
-        for r, prefix in zip(result.recordings, prefixes, strict=True)
-    }
 
 
 # --- replay.layout.json: panels of a replay for Foxglove or Lichtblick ---------------------------
@@ -263,20 +255,22 @@ def _plots(tracks: Iterable[Track]) -> Iterable[Json]:
 
 def _paths(track: Track) -> Iterable[Json]:
     who = track.topic.rpartition("/")[2]
-    colour = COLOURS["simulated" if who == "simulated" else "measured"]
+    rgba = COLOURS["simulated" if who == "simulated" else "measured"]
+    colour = "#" + "".join(f"{round(255 * part):02x}" for part in (rgba.r, rgba.g, rgba.b))
     for part in range(track.width):
         label = who if track.width == 1 else f"{who} {part}"
         yield {"value": f"{track.topic}.values[{part}]", "enabled": True, "label": label,
-               "timestampMethod": "receiveTime", "color": _hex(colour)}  # fmt: skip
-
-
-def _hex(colour: Rgba) -> str:
-    return "#" + "".join(f"{round(255 * part):02x}" for part in (colour.r, colour.g, colour.b))
+               "timestampMethod": "receiveTime", "color": colour}  # fmt: skip
 
 
 def _space(view: ReplayView, tracks: Sequence[Track]) -> Json:
     """The panel of what lies in space: scenes shown, the same as points hidden."""
-    centre, size = _body(view)
+    centre, size = np.zeros(3), _SIZE
+    if view.method is not None:
+        nodes = view.method.scene.mesh.nodes
+        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        centre[: len(low)] = (low + high) / 2
+        size = float((high - low).max()) or _SIZE
     camera = {
         "perspective": True, "distance": _FAR * size, "phi": 60.0, "thetaOffset": 45.0,
         "target": centre.tolist(), "targetOffset": [0.0, 0.0, 0.0],
@@ -287,14 +281,3 @@ def _space(view: ReplayView, tracks: Sequence[Track]) -> Json:
     return {"cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
             "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
             "layers": {}, "foxglovePanelTitle": _title(view)}  # fmt: skip
-
-
-def _body(view: ReplayView) -> tuple[Floats, float]:
-    """Centre m (3,) and size m of the body; the origin where no method has one."""
-    if view.method is None:
-        return np.zeros(3), _SIZE
-    nodes = view.method.scene.mesh.nodes
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    centre = np.zeros(3)
-    centre[: len(low)] = (low + high) / 2
-    return centre, float((high - low).max()) or _SIZE
