@@ -180,9 +180,10 @@ def body_scene(result: Result, most: int) -> BodyScene | None:
         *(tool.nodes for tool in tools if tool.plate),
     ]  # fmt: skip
     flat, normal_ = scene.mesh.dimension == 2, cut.normal if cut else None
+    view = camera(np.vstack(held_by_camera), three(toward), normal_, flat)
     return BodyScene(
-        tuple(labels[i] for i in numbers), t, shown, tools, camera(np.vstack(held_by_camera), three(toward), normal_, flat),
-        cut, float(np.linalg.norm(np.ptp(shown[0].nodes, axis=0))), flat,
+        tuple(labels[i] for i in numbers), t, shown, tools, view, cut,
+        float(np.linalg.norm(np.ptp(shown[0].nodes, axis=0))), flat,
         f"One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
         tuple(m.label for m in _bodies(result) if m.name not in names),
     )  # fmt: skip

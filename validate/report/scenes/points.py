@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
@@ -99,37 +98,30 @@ def _fill_sets(
 ) -> None:
     axes: Any = figure.subplots(1, len(_VIEWS))
     for ax, (title, eye) in zip(axes, _VIEWS, strict=True):
-        _view(ax, mesh, eye, sets, named)
+        polygons, facets = facing(mesh, eye)
+        # Greys (f, 3): the lighter the more a facet looks at the eye
+        x = mesh.nodes[facets]
+        normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        light = 0.66 + 0.28 * (normals @ eye) / np.linalg.norm(normals, axis=1)
+        greys = [(v, v, v) for v in light.tolist()]
+        ax.add_collection(
+            PolyCollection(list(polygons), facecolors=greys, edgecolors="#30303040", linewidths=0.3)
+        )
+        at = _MM * mesh.nodes @ np.stack(screen(eye), axis=1)
+        for (label, nodes), (colour, point) in zip(sets.items(), _LOOKS, strict=False):
+            seen = np.intersect1d(nodes, facets)
+            ax.plot(*at[seen].T, point, color=colour, markersize=3.2, linestyle="", label=label)
+        for label, node in named.items():
+            if node in facets:
+                ax.plot(*at[node], "*", color="white", markeredgecolor=MEASURED, markersize=13)
+                ax.annotate(label, tuple(at[node]), xytext=(7, 6), textcoords="offset points",
+                            weight="bold", bbox={"fc": "white", "ec": "none",
+                                                 "pad": 1})  # fmt: skip
+        ax.autoscale_view()
+        ax.margins(0.06, 0.22)  # room below for the triad
+        ax.set_aspect("equal")
+        ax.set_axis_off()
+        triad(ax, eye)
         ax.set_title(title)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(handles))
-
-
-def _view(
-    ax: Axes, mesh: Mesh, eye: Floats, sets: Mapping[str, Ints], named: Mapping[str, int]
-) -> None:
-    polygons, facets = facing(mesh, eye)
-    # Greys (f, 3): the lighter the more a facet looks at the eye
-    x = mesh.nodes[facets]
-    normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
-    light = 0.66 + 0.28 * (normals @ eye) / np.linalg.norm(normals, axis=1)
-    ax.add_collection(
-        PolyCollection(
-            list(polygons), facecolors=[(v, v, v) for v in light.tolist()], edgecolors="#30303040",
-            linewidths=0.3,
-        )
-    )  # fmt: skip
-    at = _MM * mesh.nodes @ np.stack(screen(eye), axis=1)
-    for (label, nodes), (colour, point) in zip(sets.items(), _LOOKS, strict=False):
-        seen = np.intersect1d(nodes, facets)
-        ax.plot(*at[seen].T, point, color=colour, markersize=3.2, linestyle="", label=label)
-    for label, node in named.items():
-        if node in facets:
-            ax.plot(*at[node], "*", color="white", markeredgecolor=MEASURED, markersize=13)
-            ax.annotate(label, tuple(at[node]), xytext=(7, 6), textcoords="offset points",
-                        weight="bold", bbox={"fc": "white", "ec": "none", "pad": 1})  # fmt: skip
-    ax.autoscale_view()
-    ax.margins(0.06, 0.22)  # room below for the triad
-    ax.set_aspect("equal")
-    ax.set_axis_off()
-    triad(ax, eye)

@@ -6,7 +6,6 @@ import numpy as np
 
 from validate.arrays import rms
 from validate.compare.exhibit import Entry, Exhibit, NumberTable, TableCell
-from validate.compare.residual import Residual
 from validate.compare.result import Result
 from validate.compare.score import max_length
 from validate.numbers import shown_unit, with_unit
@@ -23,21 +22,26 @@ _CLEAN = ("No findings: no outlier, no mirror image, no permuted labels.",)
 def registration(result: Result) -> Exhibit:
     """Method, FRE, FLE, predicted TRE, residuals of every marker; rest residuals."""
     seen = markers(result.registered[0]) if result.registered else None
-    rest = (_rest(result.rest),) if result.rest else ()
-    declared = seen is not None and isinstance(seen.registration, AsDeclared)
+    columns: Mapping[str, Shown] = {
+        "residual": "name", "unit": lambda r: shown_unit(r.unit),
+        "rms": sized(lambda r: rms(r.values)), "max": sized(lambda r: max_length(r.values)),
+        "noise": sized(lambda r: float(np.sqrt(r.values.shape[1])) * r.sd), "values": "count",
+    }  # fmt: skip
+    title = (
+        "Errors of registration and geometry at rest, before any load; noise: the rms of a "
+        "perfect model."
+    )
+    rest = (table("", title, result.rest, columns),) if result.rest else ()
     if seen is None:
         return Exhibit("registration", "Registration", (), rest)
+    declared = isinstance(seen.registration, AsDeclared)
     return Exhibit(
         "registration",
         "Registration",
-        _said(seen.registration),
+        _DECLARED if declared else seen.registration.findings or _CLEAN,
         (_quality(result, seen), *rest, *(() if declared else (_residuals(result),))),
         pictures=() if declared else (residual_arrows(seen.registration),),
     )
-
-
-def _said(found: Registration) -> tuple[str, ...]:
-    return _DECLARED if isinstance(found, AsDeclared) else found.findings or _CLEAN
 
 
 def _quality(result: Result, seen: MarkerObservation) -> NumberTable:
@@ -70,19 +74,6 @@ def _target(result: Result, found: Registration) -> Iterator[tuple[str, str, str
         nodes = scene.mesh.nodes[scene.mesh.facet_nodes(cavity.facets)]
         tre = float(found.tre_at(nodes.mean(axis=0)[None])[0])
         yield f"TRE at {cavity.name}", with_unit(tre, "m"), "predicted at the cavity's centre"
-
-
-def _rest(rest: tuple[Residual, ...]) -> NumberTable:
-    columns: Mapping[str, Shown] = {
-        "residual": "name", "unit": lambda r: shown_unit(r.unit),
-        "rms": sized(lambda r: rms(r.values)), "max": sized(lambda r: max_length(r.values)),
-        "noise": sized(lambda r: float(np.sqrt(r.values.shape[1])) * r.sd), "values": "count",
-    }  # fmt: skip
-    title = (
-        "Errors of registration and geometry at rest, before any load; noise: the rms of a "
-        "perfect model."
-    )
-    return table("", title, rest, columns)
 
 
 def _residuals(result: Result) -> NumberTable:

@@ -36,36 +36,23 @@ def environment() -> dict[str, str]:
     found = {"python": platform.python_version()}
     found |= {name: _version(distribution) for name, distribution in _PACKAGES}
     found["platform"] = f"{platform.system()} {platform.release()} {platform.machine()}"
-    found["os"] = _system()
-    found["cpu"] = _processor()
+    try:
+        found["os"] = platform.freedesktop_os_release().get("PRETTY_NAME", "unknown")
+    except OSError:
+        found["os"] = f"{platform.system()} {platform.version()}"
+    models: list[str] = []
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+        pairs = (line.partition(":") for line in lines)
+        models = [name.strip() for key, _, name in pairs if key.strip() == "model name"]
+    found["cpu"] = models[0] if models else platform.processor() or "unknown"
     found["cpu_count"] = str(os.cpu_count() or "unknown")
-    found["memory"] = _memory()
+    found["memory"] = "unknown"
+    with contextlib.suppress(AttributeError, ValueError, OSError):  # not every system says it
+        size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        found["memory"] = f"{size / 2**30:.1f} GiB"
     found |= {name: os.environ.get(name, "unset") for name in _THREADS}
     return found
-
-
-def _system() -> str:
-    with contextlib.suppress(OSError):
-        return platform.freedesktop_os_release().get("PRETTY_NAME", "unknown")
-    return f"{platform.system()} {platform.version()}"
-
-
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
-            key, _, name = line.partition(":")
-            if key.strip() == "model name":
-                return name.strip()
-    return platform.processor() or "unknown"
-
-
-def _memory() -> str:
-    """All of the machine's, which not every system says."""
-    try:
-        size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return "unknown"
-    return f"{size / 2**30:.1f} GiB"
 
 
 def _version(distribution: str) -> str:

@@ -229,7 +229,7 @@ def _taken(place: Path, folder: Path, *, shared: bool) -> int:
         # Puts back a folder between its two renames and what was kept of an old one; removes the
         # rest. A folder that was being filled holds nothing that is kept, so that all left-overs
         # are alike.
-        left = [*_left_overs(folder), *(_inside(folder) if folder.is_dir() else ())]
+        left = _left_overs(folder)
         old = next((p for p in left if p.name.startswith(f".{folder.name}.old-")), None)
         if old is not None and not folder.exists():
             old.rename(folder)
@@ -290,12 +290,10 @@ def _named(holder: str) -> str:
 
 
 def _left_overs(folder: Path) -> list[Path]:
+    """Beside a folder; inside it those of studies and of their cells."""
     patterns = (f".{escape(folder.name)}.{what}-????????" for what in _LEFT)
-    return sorted(p for pattern in patterns for p in folder.parent.glob(pattern))
-
-
-def _inside(folder: Path) -> list[Path]:
-    """Of studies inside a report's folder, and of their cells."""
+    beside = sorted(p for pattern in patterns for p in folder.parent.glob(pattern))
     names = [f".{STUDIES}.{what}-????????" for what in _LEFT]
     names += [f".{CELLS}.try-????????", f"{STUDIES}/.{CELLS}.try-????????"]
-    return sorted(p for name in names for p in folder.glob(name))
+    inside = sorted(p for name in names for p in folder.glob(name)) if folder.is_dir() else []
+    return beside + inside

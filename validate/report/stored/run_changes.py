@@ -105,27 +105,20 @@ def _runs(folder: Path) -> Iterator[PastRun]:
 def _past(folder: str, line: Json) -> PastRun:
     made = line.get("made") or {}
     files = [*line["inputs"], *made.get("files", [])]
+    verdict = "passed" if line.get("passed") else "failed"
+    if overall := line.get("overall"):
+        checks = f"{overall['evidence']} of {overall['checks']} checks"
+        verdict = f"{overall['verdict']}; evidence: {checks}"
+    sha = str(made.get("commit") or "")[:10]
+    commit = f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
     return PastRun(
-        folder, str(line["created"]), _verdict(line), _commit(made),
-        str(made.get("code_sha256") or ""),
+        folder, str(line["created"]), verdict, commit, str(made.get("code_sha256") or ""),
         tuple(str(m) for m in line["methods"]),
         tuple(str(i["sha256"]) for i in line["inputs"]),
         {str(f["path"]): str(f["sha256"]) for f in files},
         {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
         tuple(_check(c) for c in line["checks"]), line,
     )  # fmt: skip
-
-
-def _verdict(line: Json) -> str:
-    overall = line.get("overall")
-    if not overall:
-        return "passed" if line.get("passed") else "failed"
-    return f"{overall['verdict']}; evidence: {overall['evidence']} of {overall['checks']} checks"
-
-
-def _commit(made: Json) -> str:
-    sha = str(made.get("commit") or "")[:10]
-    return f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
 
 
 def _check(c: Json) -> PastCheck:
@@ -155,10 +148,11 @@ def since(one: PastRun, other: PastRun) -> Since:
             moves += _moves(earlier, c, same=same)
     moved = [m for m in moves if m.ratio is None or m.ratio > BEYOND]
     rest = [m.ratio for m in moves if m.ratio is not None and m.ratio <= BEYOND]
+    same_code = one.code == other.code and one.commit == other.commit
     return Since(
         parameters=_apart(_shown(one, other), _shown(other, one)),
         files=_apart(one.files, other.files),
-        code=_code(one, other),
+        code=None if same_code else (one.commit, other.commit),
         verdict=None if one.verdict == other.verdict else (one.verdict, other.verdict),
         added=tuple(m for m in other.methods if m not in one.methods),
         left_out=tuple(m for m in one.methods if m not in other.methods),
@@ -178,12 +172,6 @@ def _moves(one: PastCheck, other: PastCheck, *, same: bool) -> Iterator[Move]:
     else:
         ratio = by / u if u else None
     yield Move(other.method, other.name, one.value, other.value, other.unit, ratio)
-
-
-def _code(one: PastRun, other: PastRun) -> tuple[str, str] | None:
-    if one.code == other.code and one.commit == other.commit:
-        return None
-    return one.commit, other.commit
 
 
 def _shown(run: PastRun, beside: PastRun) -> dict[str, str]:

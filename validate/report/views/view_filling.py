@@ -171,7 +171,11 @@ def _shown(unit: str, wanted: str) -> tuple[str, Callable[[float], float]]:
 def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable:
     """Lines by the labels `x`, columns by the labels `by`; units in headings where one column has
     one, else in a column of their own, else beside each number."""
-    labels, grid = texts(view.x), _grid(view, rows, table)
+    labels, by = texts(view.x), texts(view.by)
+    grid: Grid = {}
+    for row in rows:
+        line = grid.setdefault(_key(row, labels, table), {})
+        line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
     across = _across(view, rows, table)
     cells = [[_cell(view, line.get(key, []), column, _check(line)) for _, key, column in across]
              for line in grid.values()]  # fmt: skip
@@ -199,15 +203,6 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
     return NumberTable(
         "", view.title, tuple(heads), tuple(lines), view.caption, view.folded, view.below
     )
-
-
-def _grid(view: View, rows: Sequence[LongRow], table: LongTable) -> Grid:
-    labels, by = texts(view.x), texts(view.by)
-    grid: Grid = {}
-    for row in rows:
-        line = grid.setdefault(_key(row, labels, table), {})
-        line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
-    return grid
 
 
 def _across(view: View, rows: Sequence[LongRow], table: LongTable) -> list[tuple[str, str, str]]:
@@ -240,7 +235,15 @@ def _check(line: Mapping[str, list[LongRow]]) -> LongRow | None:
 
 
 def _cell(view: View, rows: list[LongRow], column: str, check: LongRow | None) -> TableCell:
-    row = _chosen(view, rows, column)
+    if len(rows) > 1 and not view.several:
+        first = rows[0]
+        raise ComparisonError(
+            f"view '{view.name}': {len(rows)} rows are in one cell ({first.method} {first.name}); "
+            "name more columns in x or by, narrower rows, or `several`"
+        )
+    row = rows[-1] if rows else None
+    if view.several == "largest":
+        row = max(rows, key=lambda r: abs(_number(r, column) or 0.0), default=None)
     if row is None:
         return TableCell(None)
     if column in _NUMBERS:
@@ -272,18 +275,6 @@ def _to_decimal(view: View, row: LongRow, number: float | None, check: LongRow |
     found = to_decimal_of(term * turn(_TWO * check.sd), turn(number))[1]
     changed = float(digits(found)) != float(f"{turn(number):.9g}")
     return "" if row.part == "check.limit" and changed else found
-
-
-def _chosen(view: View, rows: list[LongRow], column: str) -> LongRow | None:
-    if len(rows) > 1 and not view.several:
-        first = rows[0]
-        raise ComparisonError(
-            f"view '{view.name}': {len(rows)} rows are in one cell ({first.method} {first.name}); "
-            "name more columns in x or by, narrower rows, or `several`"
-        )
-    if view.several == "largest":
-        return max(rows, key=lambda r: abs(_number(r, column) or 0.0), default=None)
-    return rows[-1] if rows else None
 
 
 def _units(cells: Iterable[TableCell]) -> set[str]:
@@ -319,7 +310,12 @@ def _chart(view: View, rows: Sequence[LongRow], table: LongTable) -> Chart | Non
         return None
     unit, turn = _axis(view, rows)
     x_name, x_unit, x_of = _abscissa(view, rows, table)
-    first, *others = _telling(view, rows) or ("",)
+    # The labels of `by` that tell rows apart; the first one always does
+    column = {"label": "method"}
+    first, *others = [
+        b for i, b in enumerate(texts(view.by))
+        if i == 0 or len({getattr(r, column.get(b, b)) for r in rows}) > 1
+    ] or [""]  # fmt: skip
     lines: dict[tuple[str, str], list[tuple[float, float, float | None]]] = {}
     levels = []
     for row in rows:
@@ -389,14 +385,6 @@ def _less(view: View, rows: Sequence[LongRow], table: LongTable) -> Iterator[Lon
         if row.value is not None and reference is not None:
             sd = row.sd if row.method == view.less else None
             yield row._replace(value=row.value - reference, sd=sd)
-
-
-def _telling(view: View, rows: Sequence[LongRow]) -> tuple[str, ...]:
-    """The labels of `by` that tell rows apart; the first one always does."""
-    by = texts(view.by)
-    column = {"label": "method"}
-    return tuple(b for i, b in enumerate(by)
-                 if i == 0 or len({getattr(r, column.get(b, b)) for r in rows}) > 1)  # fmt: skip
 
 
 def _axis(view: View, rows: Sequence[LongRow]) -> tuple[str, Callable[[float], float]]:
