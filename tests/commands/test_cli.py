@@ -55,8 +55,8 @@ from validate.scene.geometries.box import box
 from validate.scene.mesh_files.third_party_meshes import ForeignBody
 
 # private: _MAX_TABLE: replaced by a small number: a short test.
-# private: _content, _document, _drawn, _metres, _part, _pictured, _place, _running, _seen: called
-#   alone, case by case.
+# private: _content, _document, _drawn, _found, _metres, _part, _running, _seen: called alone,
+#   case by case.
 # private: _judged: replaced, to bring a case about.
 
 COARSE = [
@@ -405,6 +405,9 @@ def test_places_that_cannot_be_known_are_refused(
         known_places.known_places(tmp_path / "d.xml", None)
 
 
+OUTLINE = dict.fromkeys(("sd", "unit", "label", "centre", "radius"))
+
+
 @pytest.mark.parametrize(
     ("call", "says"),
     [
@@ -412,7 +415,8 @@ def test_places_that_cannot_be_known_are_refused(
                                                                     "length, as mm"),
         (lambda: bodies._metres("edge", "2"), "--edge 2: expected a length with its unit, as 2mm"),
         (lambda: bodies._metres("edge", "-2mm"), "--edge -2mm: expected a length with its unit"),
-        (lambda: outlining._place("3px", None), "--centre 3px: expected X,Y as 120px,80px or"),
+        (lambda: outlining._found(None, "", {**OUTLINE, "centre": "3px"}),
+         "--centre 3px: expected X,Y as 120px,80px or"),
         (
             lambda: outlining._drawn(Path("a"), None, "", {"centre": "1px,1px", "radius": 0,
                                                            "bright": False}),
@@ -489,7 +493,7 @@ def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
 
 
 def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     poses = {"a": np.arange(3.0), "b": np.arange(3.0) + 0.5}
 
@@ -503,12 +507,6 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
     monkeypatch.setattr(outlining, "read_recording", lambda file: partly)
     with pytest.raises(UsageError, match=r"a\.mcap has 2 topics that are not read"):
         outlining.outline(Path("a.mcap"), None, "", "", None, {})
-    frames = SimpleNamespace()
-    monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: (None, None))
-    monkeypatch.setattr(outlining, "png", lambda picture: b"")
-    contours = SimpleNamespace(t=np.zeros(1))
-    with pytest.raises(RecordingError, match=r"a\.png: cannot be written"):
-        outlining._pictured(frames, contours, tmp_path / "no" / "a.png", ())  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "inf", "nan"])

@@ -54,16 +54,23 @@ def check(
     no figure moved and every verdict is the declared one."""
     found: list[Json] = []
     figures: list[Json] = []
-    reports = _writable(reports_of(None, out), out)
+    home, reports = reports_of(None, out), None
+    try:
+        try_results(home / FOLDER, ())
+        reports = home
+    except UsageError as error:
+        if out:
+            raise
+        complain(f"no page of printed figures: {error}")
 
     def one(experiment: Experiment) -> bool:
-        content, why, folder = None, "", run_folder(experiment, Options({}), out)
+        content, why = None, ""
         if not fresh:  # the stored run, where it would be made again from the same
+            folder = run_folder(experiment, Options({}), out)
             content, why = stored_run(experiment, folder)
         if content is not None:
-            when, where = content["created"], relative(folder)
-            again = f"stored run of {when} ({where}); --fresh repeats it"
-            say(f"{experiment.name}: {again}", error=True)
+            run = f"stored run of {content['created']} ({relative(folder)})"
+            say(f"{experiment.name}: {run}; --fresh repeats it", error=True)
         else:
             if why:
                 say(f"{experiment.name}: run again: {why}", error=True)
@@ -101,19 +108,6 @@ def check(
     if as_json:
         print(json.dumps(found, ensure_ascii=False, indent=1, allow_nan=False))
     return code
-
-
-def _writable(reports: Path, out: Path | None) -> Path | None:
-    """The folder of reports; None, and a line, where nothing can be written and `out` is not asked
-    for."""
-    try:
-        try_results(reports / FOLDER, ())
-    except UsageError as error:
-        if out:
-            raise
-        complain(f"no page of printed figures: {error}")
-        return None
-    return reports
 
 
 def _content(result: Result) -> Json:

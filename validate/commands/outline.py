@@ -65,7 +65,17 @@ def outline(
     write_recording(replace(recording, contours=streams, metadata=records), out)
     for key, text in told.items():
         say(f"{key}: {text}", indent="  ")
-    _pictured(frames, contours, out.with_name(f"{out.stem}-{safe_name(name)}.png"), marks)
+    # Some images, evenly, with their outlines; in the first one the given place, and what else
+    # might be meant
+    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
+    holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
+    _, picture = outlines_over(frames, contours, holds, "evenly spaced in time", "", marks=marks)
+    place = out.with_name(f"{out.stem}-{safe_name(name)}.png")
+    try:
+        place.write_bytes(png(picture))
+    except OSError as error:
+        raise RecordingError(f"{place}: cannot be written ({error.strerror})") from error
+    say(f"{place}: {len(at)} images with their outlines: check them", indent="  ")
     say(
         f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
         indent="  ",
@@ -78,8 +88,15 @@ def _found(
     for option in ("sd", "unit", "label"):
         if given[option]:
             raise UsageError(f"--{option} is for third-party outlines; give it with --from FILE")
-    hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
-                given["shape"], given["bright"])  # fmt: skip
+    # From the first pixel's centre, m
+    centre: Any = None
+    if (text := given["centre"]) is not None:
+        parts = text.split(",")
+        if len(parts) != 2:
+            raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
+        centre = np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
+    radius = _length("--radius", given["radius"], frames)
+    hint = Hint(centre, radius, given["shape"], given["bright"])
     with progress("outlines") as report:
         found = followed(frames, hint, images, report, given["confidence"])
     if found.rivals:
@@ -94,11 +111,10 @@ def _found(
         i, why = next(iter(found.without.items()))
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
     # What was said, a radius alone about the outline, and the other regions
-    first = found.contours.outlines[0].mean(axis=0)
-    centre = first if hint.centre is None else hint.centre
-    marks = [PlaceSaid("as given", centre, hint.radius, True)]
-    if hint.centre is None and hint.radius is None:
-        marks = []
+    marks = []
+    if centre is not None or radius is not None:
+        place = found.contours.outlines[0].mean(axis=0) if centre is None else centre
+        marks = [PlaceSaid("as given", place, radius, True)]
     others = (*found.rivals, *found.beside)
     marks += [PlaceSaid("another region", r.centre, r.radius) for r in others]
     sd, c = found.contours.sd, found.confidence
@@ -143,16 +159,6 @@ def _drawn(
     return contours, {**told, "label": label} if label else told
 
 
-def _place(text: str | None, frames: Frames) -> Any:
-    """X,Y in pixels or with units, from the first pixel's centre, m."""
-    if text is None:
-        return None
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
-    return np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
-
-
 def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> float | None:
     if text is None:
         return None
@@ -162,18 +168,3 @@ def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> flo
     if value is None or not np.isfinite(value) or (value <= 0 and option != "--centre"):
         raise UsageError(f"{option} {text}: expected a length with its unit, as 8mm or 80px")
     return float(value)
-
-
-def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[PlaceSaid, ...]) -> None:
-    """Up to six images, evenly, with their outlines; in the first one what was said of the place
-    and what else might be meant."""
-    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
-    holds = tuple(Held(f"outline {i}", 0.0, "m", float(contours.t[i])) for i in at)
-    try:
-        _, picture = outlines_over(
-            frames, contours, holds, "evenly spaced in time", "", marks=marks
-        )
-        file.write_bytes(png(picture))
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error
-    say(f"{file}: {len(at)} images with their outlines: check them", indent="  ")

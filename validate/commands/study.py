@@ -20,7 +20,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.report.stored.folder import MARK
 from validate.study.choose.exhibits import words
-from validate.study.choose.study import Choice, error_of
+from validate.study.choose.study import error_of
 from validate.study.coverage import page as coverage_page
 from validate.study.coverage.page import HEAD, interval, percent
 from validate.study.filters import page as filter_page
@@ -31,7 +31,6 @@ from validate.study.filters.study import FilterStudy
 from validate.study.stability import page as stability_page
 from validate.study.sweep import named
 from validate.study.tradeoff import page as trade_page
-from validate.study.tradeoff.study import Trade
 
 _SETTINGS = 30  # characters of the settings of a place
 _RANKINGS = 2  # conditions whose rankings a screen shows
@@ -146,8 +145,22 @@ def tradeoff(name: str, common: StudyOptions, simulators: tuple[str, ...] = ()) 
     """Measure error against time; 0."""
     with noted():
         done = studies.tradeoff(common.experiment(name), common.settings, simulators)
-    if not printed(done.page, common):
-        answer(_trade_passages(done.found), done.found.done, done.page, common.detail)
+    if printed(done.page, common):
+        return OK
+    found = done.found
+    passages = [sentences([trade_page.sentence(found)], None), _warned(found.locking)]
+    head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
+    for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
+        cells = [
+            [r.solver.name, r.element, str(r.level),
+             significant(found.scale * float(getattr(r, by))),
+             significant(1e6 * (r.time_s or 0.0))]
+            for r in found.front(by).rows
+        ]  # fmt: skip
+        dominated = found.front(by).dominated
+        text = [f"dominated ({by}): {'; '.join(dominated)}"] if dominated else []
+        passages += [Passage(title, rows(head, cells), 3), sentences(text)]
+    answer(passages, found.done, done.page, common.detail)
     return OK
 
 
@@ -170,7 +183,22 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
                 table("Excluded by a lower bound", head, [
                     [e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded
                 ])  # fmt: skip
-        answer(_choice_passages(choice), choice.trade.done, done.page, common.detail)
+        # The answer, then what each candidate method reaches
+        first, *others = words(choice)
+        cells = []
+        for c in choice.ladder:
+            measured = None if c.best is None else error_of(c.best, choice.by)
+            reached = _text(None if measured is None else choice.trade.scale * measured)
+            cells.append([c.rung, reached, c.verdict])
+        columns = ["", f"error / {choice.trade.shown_unit}", "verdict"]
+        passages = [
+            sentences([first], None),
+            sentences(others, None, keep=4),
+            _warned(choice.trade.locking),
+            Passage("Candidate methods", rows(columns, cells), 4),
+            sentences(choice.rejected, keep=1, most=4),
+        ]
+        answer(passages, choice.trade.done, done.page, common.detail)
     return OK if choice.pick is not None else FAILED
 
 
@@ -237,44 +265,6 @@ def _text(entry: Entry | TableCell) -> str:
     if value is None:
         return MISSING
     return significant(value) if isinstance(value, float) else str(value)
-
-
-def _trade_passages(found: Trade) -> list[Passage]:
-    passages = [
-        sentences([trade_page.sentence(found)], None),
-        _warned(found.locking),
-    ]
-    head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
-    for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
-        cells = [
-            [r.solver.name, r.element, str(r.level),
-             significant(found.scale * float(getattr(r, by))),
-             significant(1e6 * (r.time_s or 0.0))]
-            for r in found.front(by).rows
-        ]  # fmt: skip
-        dominated = found.front(by).dominated
-        text = [f"dominated ({by}): {'; '.join(dominated)}"] if dominated else []
-        passages += [Passage(title, rows(head, cells), 3), sentences(text)]
-    return passages
-
-
-def _choice_passages(choice: Choice) -> list[Passage]:
-    """The answer, then what each candidate method reaches."""
-    first, *others = words(choice)
-    cells = []
-    for c in choice.ladder:
-        error = None if c.best is None else error_of(c.best, choice.by)
-        reached = _text(None if error is None else choice.trade.scale * error)
-        cells.append([c.rung, reached, c.verdict])
-    head = ["", f"error / {choice.trade.shown_unit}", "verdict"]
-    ladder = rows(head, cells)
-    return [
-        sentences([first], None),
-        sentences(others, None, keep=4),
-        _warned(choice.trade.locking),
-        Passage("Candidate methods", ladder, 4),
-        sentences(choice.rejected, keep=1, most=4),
-    ]
 
 
 def _warned(texts: Sequence[str]) -> Passage:

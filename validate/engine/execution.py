@@ -153,8 +153,16 @@ def _shared(
 
     def by_workers() -> None:
         try:
-            if not _worth_it(queue, cells, plan.after):
-                return
+            # Whether the rest, and what comes after, takes longer than workers take to start, by
+            # what was done until now
+            start = perf_counter()
+            while len(queue):
+                sleep(_PATIENCE)
+                gone, finished = perf_counter() - start, cells - len(queue) - queue.running
+                if gone * (len(queue) + plan.after) > _WORTH * max(finished, 0.5):
+                    break
+            else:
+                return  # nothing is left
             from validate.engine.cluster import Drain
 
             Drain(plan, pool.client(), done, here, ahead=1).run(queue)
@@ -181,18 +189,6 @@ def _shared(
     if raised:
         raise raised[0]
     return pool.words if pool.busy else "this process"
-
-
-def _worth_it(queue: Queue, cells: int, after: int) -> bool:
-    """Whether the rest, and what comes `after`, takes longer than workers take to start, by what
-    was done until now; False once nothing is left."""
-    start = perf_counter()
-    while len(queue):
-        sleep(_PATIENCE)
-        gone, done = perf_counter() - start, cells - len(queue) - queue.running
-        if gone * (len(queue) + after) > _WORTH * max(done, 0.5):
-            return True
-    return False
 
 
 # --- cache of a worker between cells: the last few values by key ---------------------------------

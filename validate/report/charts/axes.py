@@ -98,8 +98,10 @@ def styled(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
     shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
     drawn = {}
     for s in others:
-        look = mine.get(s.label) or turns.get(id(s)) or _given(s, shades.get(id(s), MEASURED))
-        drawn[id(s)] = Drawn(s, look, signs.get(id(s), 0))
+        # A reference is a wide pale line under the others, what was measured dark points
+        shade, width = ("#C0C0C0", 3.6) if s.style == "line" else (shades.get(id(s), MEASURED), 1.2)
+        given = Style(shade, "-", "o", width)
+        drawn[id(s)] = Drawn(s, mine.get(s.label) or turns.get(id(s)) or given, signs.get(id(s), 0))
     lines = {d.series.label: d.look for d in drawn.values() if d.series.style == "line"}
     drawn |= {id(s): Drawn(s, _of_band(s, lines)) for s in series if s.style == "band"}
     return [drawn[id(s)] for s in series]
@@ -119,13 +121,6 @@ def alone(result: HasMethods, series: Sequence[Series], label: str) -> list[Draw
         else Drawn(s, first) if band_of(s, (label,)) else others[id(s)]
         for s in series
     ]  # fmt: skip
-
-
-def _given(series: Series, shade: str) -> Style:
-    """A reference is a wide pale line under the others, what was measured dark points."""
-    if series.style == "line":
-        return Style("#C0C0C0", "-", "o", 3.6)
-    return Style(shade, "-", "o", 1.2)
 
 
 def _known(result: HasMethods) -> Mapping[str, Style]:

@@ -299,9 +299,18 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
                 "dash": [] if dash == "-" else [3 * float(length) for length in dash[1]],
                 "width": 0.9 if jagged else drawn.look.width or 1.0,
                 "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
-        style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
-        if style == "line" and len(found := _ways(drawn.series.x)) > 1:
-            style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
+        style, across = drawn.series.style, drawn.series.x
+        ways = [np.argsort(across, kind="stable")]
+        if style == "line":  # parts between its turns, each in rising x; neighbours share ends
+            sense = np.sign(np.diff(across))
+            moving = np.flatnonzero(sense)
+            turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
+            ends = [0, *turns.tolist(), len(across) - 1]
+            parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+            if len(parts) > _WAYS:
+                style = "points"
+            elif len(parts) > 1:
+                ways = [part[np.argsort(across[part], kind="stable")] for part in parts]
         for way in ways:
             x, columns = _points(drawn.series, way, least)
             if x not in xs:
@@ -312,16 +321,6 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
         "series": series,
         "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
     }  # fmt: skip
-
-
-def _ways(x: Floats) -> list[Ints]:
-    """Indices of the parts of x (k,) between its turns, each in rising x; neighbours share ends."""
-    sense = np.sign(np.diff(x))
-    moving = np.flatnonzero(sense)
-    turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
-    ends = [0, *turns.tolist(), len(x) - 1]
-    parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
-    return [part[np.argsort(x[part], kind="stable")] for part in parts]
 
 
 def _points(

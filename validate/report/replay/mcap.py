@@ -73,12 +73,28 @@ def write_replay(result: Result, path: Path) -> None:
         }
         for r, prefix in zip(result.recordings, _prefixes(result), strict=True)
     }
+    method = shown_method(result)
+    frames_alone = any(over_time(view) for view in views(result))
+    record = {
+        "format": "1",
+        "experiment": result.name,
+        "method": method.name if method else "",
+        "method_label": method.label if method else "",
+        "quick": "yes" if result.quick else "no",
+        "kind": result.kind,
+        "interpolated": "nothing: output frames keep their times" if frames_alone
+                        else f".../simulated/scene and points: {HOW}",
+    }  # fmt: skip
     coarse = 1
     while True:
         shown = [(view, tracks(view)) for view in views(result, coarse)]
         found = tuple(t for _, tracks in shown for t in tracks)
         channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
-        metadata = {RECORD: _record(result, found, coarse), **inputs}
+        thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
+        thinned += [f"interpolated instants: one in {coarse}"] if coarse > 1 else []
+        record["thinned"] = "; ".join(thinned) or "nothing"
+        record["left_out"] = "; ".join(_left_out(result, method, found)) or "nothing"
+        metadata = {RECORD: record, **inputs}
         metadata |= {name: values for t in found for name, values in t.records}
         write_channels(path, channels, _in_time(found), metadata)
         if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
@@ -136,27 +152,6 @@ def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
     for k in np.argsort(ns, kind="stable"):
         track = found[which[k]]
         yield WrittenMessage(track.topic, int(ns[k]), track.message(int(number[k])))
-
-
-def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, str]:
-    method = shown_method(result)
-    thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
-    if coarse > 1:
-        thinned.append(f"interpolated instants: one in {coarse}")
-    frames_alone = any(over_time(view) for view in views(result))
-    return {
-        "format": "1",
-        "experiment": result.name,
-        "method": method.name if method else "",
-        "method_label": method.label if method else "",
-        "quick": "yes" if result.quick else "no",
-        "kind": result.kind,
-        "interpolated": "nothing: output frames keep their times"
-        if frames_alone
-        else f".../simulated/scene and points: {HOW}",
-        "thinned": "; ".join(thinned) or "nothing",
-        "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
-    }
 
 
 def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
@@ -217,7 +212,25 @@ def _recording(view: ReplayView, tracks: Sequence[Track], panels: dict[str, Json
     beside += [_add(panels, "Plot", plot) for plot in _plots(tracks)]
     if not any(t.schema == SCENE for t in tracks):
         return _column(beside)
-    space = _add(panels, "3D", _space(view, tracks))
+    # The panel of what lies in space: scenes shown, the same as points hidden
+    centre, size = np.zeros(3), _SIZE
+    if view.method is not None:
+        nodes = view.method.scene.mesh.nodes
+        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        centre[: len(low)] = (low + high) / 2
+        size = float((high - low).max()) or _SIZE
+    camera = {
+        "perspective": True, "distance": _FAR * size, "phi": 60.0, "thetaOffset": 45.0,
+        "target": centre.tolist(), "targetOffset": [0.0, 0.0, 0.0],
+        "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": size / 100,
+        "far": 100 * size,
+    }  # fmt: skip
+    topics = {t.topic: {"visible": t.schema == SCENE} for t in tracks if t.schema in (SCENE, CLOUD)}
+    space = _add(panels, "3D", {
+        "cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
+        "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
+        "layers": {}, "foxglovePanelTitle": _title(view),
+    })  # fmt: skip
     if not beside:
         return space
     return {"first": space, "second": _column(beside), "direction": "row",
@@ -261,23 +274,3 @@ def _paths(track: Track) -> Iterable[Json]:
         label = who if track.width == 1 else f"{who} {part}"
         yield {"value": f"{track.topic}.values[{part}]", "enabled": True, "label": label,
                "timestampMethod": "receiveTime", "color": colour}  # fmt: skip
-
-
-def _space(view: ReplayView, tracks: Sequence[Track]) -> Json:
-    """The panel of what lies in space: scenes shown, the same as points hidden."""
-    centre, size = np.zeros(3), _SIZE
-    if view.method is not None:
-        nodes = view.method.scene.mesh.nodes
-        low, high = nodes.min(axis=0), nodes.max(axis=0)
-        centre[: len(low)] = (low + high) / 2
-        size = float((high - low).max()) or _SIZE
-    camera = {
-        "perspective": True, "distance": _FAR * size, "phi": 60.0, "thetaOffset": 45.0,
-        "target": centre.tolist(), "targetOffset": [0.0, 0.0, 0.0],
-        "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": size / 100,
-        "far": 100 * size,
-    }  # fmt: skip
-    topics = {t.topic: {"visible": t.schema == SCENE} for t in tracks if t.schema in (SCENE, CLOUD)}
-    return {"cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
-            "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
-            "layers": {}, "foxglovePanelTitle": _title(view)}  # fmt: skip

@@ -244,19 +244,13 @@ def flat_triangles(facets: Ints) -> Ints:
 
 
 def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> SurfacePart:
-    drawn = triangles if share >= 1 else _thinned(mesh.nodes, triangles, share)
-    nodes, local = np.unique(drawn, return_inverse=True)
-    return SurfacePart(name, nodes, local.reshape(-1, 3), len(triangles))
-
-
-def _thinned(nodes: Floats, triangles: Ints, share: float) -> Ints:
     """Triangles between fewer nodes: `share` of them at most, unless under `_FEWEST` are left."""
-    corners = nodes[triangles]
+    corners = mesh.nodes[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1).sum()
     size = float(np.sqrt(2 * area / len(triangles)))  # the legs of an average triangle
     used = np.unique(triangles)
-    x, corner = nodes[used], np.searchsorted(used, triangles)
+    x, corner = mesh.nodes[used], np.searchsorted(used, triangles)
     kept = triangles
     while len(kept) > share * len(triangles):
         # The nodes in a box of this size become the one nearest to their mean
@@ -272,6 +266,7 @@ def _thinned(nodes: Floats, triangles: Ints, share: float) -> Ints:
         joined = moved[(a != b) & (b != c) & (a != c)]
         _, unique = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
         if len(unique) < _FEWEST:
-            return kept
+            break
         kept, size = np.asarray(joined[np.sort(unique)]), 1.2 * size
-    return kept
+    nodes, local = np.unique(kept, return_inverse=True)
+    return SurfacePart(name, nodes, local.reshape(-1, 3), len(triangles))

@@ -225,7 +225,12 @@ def _taken(place: Path, folder: Path, *, shared: bool) -> int:
         os.close(descriptor)  # removed by its last holder meanwhile
     if alone:
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, _holder(), 0)
+        command = shlex.join(["validate", *sys.argv[1:]]) if sys.argv else "Python"
+        holder = json.dumps({
+            "command": command[:200], "process": os.getpid(), "host": socket.gethostname(),
+            "since": datetime.now(UTC).isoformat(timespec="seconds"),
+        })  # fmt: skip
+        os.pwrite(descriptor, holder.encode(), 0)
         # Puts back a folder between its two renames and what was kept of an old one; removes the
         # rest. A folder that was being filled holds nothing that is kept, so that all left-overs
         # are alike.
@@ -263,18 +268,6 @@ def _is_there(place: Path, descriptor: int) -> bool:
         return os.path.samestat(place.stat(), os.fstat(descriptor))
     except OSError:
         return False
-
-
-def _holder() -> bytes:
-    command = shlex.join(["validate", *sys.argv[1:]]) if sys.argv else "Python"
-    return json.dumps(
-        {
-            "command": command[:200],
-            "process": os.getpid(),
-            "host": socket.gethostname(),
-            "since": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-    ).encode()
 
 
 def _named(holder: str) -> str:

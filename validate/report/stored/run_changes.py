@@ -94,31 +94,28 @@ def history(reports: Path, name: str) -> tuple[PastRun, ...]:
 def _runs(folder: Path) -> Iterator[PastRun]:
     try:
         for line in lines_of(folder):
-            yield _past(folder.name, line)
+            made = line.get("made") or {}
+            files = [*line["inputs"], *made.get("files", [])]
+            verdict = "passed" if line.get("passed") else "failed"
+            if overall := line.get("overall"):
+                checks = f"{overall['evidence']} of {overall['checks']} checks"
+                verdict = f"{overall['verdict']}; evidence: {checks}"
+            sha = str(made.get("commit") or "")[:10]
+            commit = f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
+            yield PastRun(
+                folder.name, str(line["created"]), verdict, commit,
+                str(made.get("code_sha256") or ""),
+                tuple(str(m) for m in line["methods"]),
+                tuple(str(i["sha256"]) for i in line["inputs"]),
+                {str(f["path"]): str(f["sha256"]) for f in files},
+                {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
+                tuple(_check(c) for c in line["checks"]), line,
+            )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(
             f"{folder / LINES} has a line that `validate` did not write ({error!r:.60}); "
             "correct or remove the file"
         ) from error
-
-
-def _past(folder: str, line: Json) -> PastRun:
-    made = line.get("made") or {}
-    files = [*line["inputs"], *made.get("files", [])]
-    verdict = "passed" if line.get("passed") else "failed"
-    if overall := line.get("overall"):
-        checks = f"{overall['evidence']} of {overall['checks']} checks"
-        verdict = f"{overall['verdict']}; evidence: {checks}"
-    sha = str(made.get("commit") or "")[:10]
-    commit = f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
-    return PastRun(
-        folder, str(line["created"]), verdict, commit, str(made.get("code_sha256") or ""),
-        tuple(str(m) for m in line["methods"]),
-        tuple(str(i["sha256"]) for i in line["inputs"]),
-        {str(f["path"]): str(f["sha256"]) for f in files},
-        {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
-        tuple(_check(c) for c in line["checks"]), line,
-    )  # fmt: skip
 
 
 def _check(c: Json) -> PastCheck:

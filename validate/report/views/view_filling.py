@@ -176,7 +176,18 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
     for row in rows:
         line = grid.setdefault(_key(row, labels, table), {})
         line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
-    across = _across(view, rows, table)
+    # Heading, label and column of what each column shows
+    y = texts(view.y)
+    keys = dict.fromkeys(" ".join(filter(None, _key(r, by, table))) for r in rows)
+    if view.columns:
+        parts = [(head, *text.partition(":")[::2]) for head, text in view.columns.items()]
+        across = [(head.replace("*", star), key, column or y[0])
+                  for head, label, column in parts
+                  for key, star in _matched(label, keys)]  # fmt: skip
+    else:
+        named = len(y) > 1 or "" in keys
+        across = [(" ".join(filter(None, (key, column if named else ""))), key, column)
+                  for key in keys for column in y]  # fmt: skip
     cells = [[_cell(view, line.get(key, []), column, _check(line)) for _, key, column in across]
              for line in grid.values()]  # fmt: skip
     kept = [j for j in range(len(across)) if any(plain(c[j]) not in (None, "") for c in cells)]
@@ -203,20 +214,6 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
     return NumberTable(
         "", view.title, tuple(heads), tuple(lines), view.caption, view.folded, view.below
     )
-
-
-def _across(view: View, rows: Sequence[LongRow], table: LongTable) -> list[tuple[str, str, str]]:
-    """Heading, label and column of what each column shows."""
-    y = texts(view.y)
-    keys = dict.fromkeys(" ".join(filter(None, _key(r, texts(view.by), table))) for r in rows)
-    if view.columns:
-        parts = [(head, *text.partition(":")[::2]) for head, text in view.columns.items()]
-        return [(head.replace("*", star), key, column or y[0])
-                for head, label, column in parts
-                for key, star in _matched(label, keys)]  # fmt: skip
-    told = len(y) > 1 or "" in keys
-    return [(" ".join(filter(None, (key, column if told else ""))), key, column)
-            for key in keys for column in y]  # fmt: skip
 
 
 def _matched(label: str, keys: Iterable[str]) -> list[tuple[str, str]]:
