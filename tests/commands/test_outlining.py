@@ -87,8 +87,9 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
 
 def test_a_picture_that_cannot_be_written_is_refused(moving: Path, tmp_path: Path) -> None:
     (tmp_path / "c-outline.png").mkdir()
-    line = refused("outline", str(moving), "-o", str(tmp_path / "c.mcap"))
-    assert "c-outline.png: cannot be written" in line
+    code, _, err = here("outline", str(moving), "-o", str(tmp_path / "c.mcap"))
+    assert code == 2
+    assert "c-outline.png: cannot be written" in err
 
 
 @pytest.mark.slow
