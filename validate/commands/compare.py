@@ -51,7 +51,16 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
         everything = wanted.everything
         columns = width(sys.stdout)
         warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
-        head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
+        headline = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
+        errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
+        changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
+        if changed:
+            _, change, row = max(changed, key=lambda c: c[0])
+            name = f"{row.method}: {row.score}" if row.method else row.score
+            headline += f"; largest change: {name}, {100 * change:+.3g} %."
+        else:
+            headline += "; no error changed."
+        head = [*sentences([headline]).laid(whole=True).lines, *warnings.lines]
         parameters = _parameters(found, columns, everything=everything)
         shown, more, unseen = pairs(found, every=everything)
         room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
@@ -82,18 +91,6 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
             page = write_comparison(found, document(found), folder)
             if not as_json:
                 say(f"charts and all scores: {relative(page)}")
-
-
-def _headline(found: SideBySide) -> str:
-    """How many scores of how many runs, and which one changed most between two of them."""
-    count = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
-    errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
-    changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
-    if not changed:
-        return f"{count}; no error changed."
-    _, change, row = max(changed, key=lambda c: c[0])
-    name = f"{row.method}: {row.score}" if row.method else row.score
-    return f"{count}; largest change: {name}, {100 * change:+.3g} %."
 
 
 def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[str], int, int]:

@@ -52,7 +52,17 @@ def import_files(
     if len(files) == 1 and files[0].is_dir() and not kind:
         known = known_unread(files[0]) or any(recognises(r, files[0]) for r in READERS)
         found = found if known else [member(file) for file in members(files[0])] or found
-    logs = [log for file in found for log in _read(file, kind, said)]
+    logs: list[Recording] = []
+    for file in found:
+        # A file as its reader makes it, all its specimens where that is said, and what decided
+        reader = named(kind) if kind else recognised(file)
+        every = said.get("specimen") == ALL
+        read = every_specimen(reader, file, said) if every else [reader.read(file, said)]
+        why = "as given by --as" if kind else f"because {reader.sign}"
+        say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
+        for recording in read:
+            _tell(recording)
+        logs += read
     if len(logs) == 1 and specimens is None:
         recording = logs[0]
     else:
@@ -64,18 +74,6 @@ def import_files(
     for line in _besides(recording):
         complain(line)
     ask_back(recording)
-
-
-def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recording]:
-    """A file as its reader makes it, all its specimens where that is said, and what decided."""
-    reader = named(kind) if kind else recognised(file)
-    every = said.get("specimen") == ALL
-    found = every_specimen(reader, file, said) if every else [reader.read(file, said)]
-    why = "as given by --as" if kind else f"because {reader.sign}"
-    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
-    for recording in found:
-        _tell(recording)
-    return found
 
 
 def _tell(recording: Recording) -> None:

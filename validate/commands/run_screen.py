@@ -60,15 +60,28 @@ def show_run(
         low, high = v.interval
         value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
         identified.append([v.name, f"{value} ± {half}", f"by {v.by}"])
+    # Why methods did not finish; one line for those with the same reason
+    ends: dict[str, list[str]] = {}
+    for method in result.methods:
+        if ended := next((r.outcome for r in method.runs if not r.finished), None):
+            why = f"{ended.state} at step {ended.step}: {ended.why}"
+            ends.setdefault(why, []).append(method.name)
+    unfinished = [f"{', '.join(names)}: {why}" for why, names in ends.items()]
+    # The likely causes of the first difference, with what would decide each
+    cells: list[list[str]] = []
+    if found := next((e for e in result.exhibits if e.anchor == "likely-causes"), None):
+        every = found.tables[0].rows
+        first = [r for r in every if r[:2] == every[0][:2]]
+        cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
     show(
         (
             sentences([headline(result)], None),
             sentences(texts, None),
             sentences((f"warning: {text}" for text in warnings), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
-            sentences(_unfinished(result), keep=2, most=4),
+            sentences(unfinished, keep=2, most=4),
             Passage("Identified, with 95 % intervals", rows([""] * 3, identified), 1, 4),
-            Passage(causes, () if verbose else _causes(result), 2, 4),
+            Passage(causes, () if verbose else rows([""] * 3, cells, soft=2), 2, 4),
             *([ranking] if ranking else []),
             figures_line([figure_members(p) for p in result.published], name),
             Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
@@ -125,28 +138,6 @@ def _checks(result: Result) -> list[Json]:
 
 
 # --- methods --------------------------------------------------------------------------------------
-
-
-def _unfinished(result: Result) -> list[str]:
-    """Why methods did not finish; one line for those with the same reason."""
-    ends: dict[str, list[str]] = {}
-    for method in result.methods:
-        if ended := next((r.outcome for r in method.runs if not r.finished), None):
-            ends.setdefault(f"{ended.state} at step {ended.step}: {ended.why}", []).append(
-                method.name
-            )
-    return [f"{', '.join(names)}: {why}" for why, names in ends.items()]
-
-
-def _causes(result: Result) -> tuple[str, ...]:
-    """The likely causes of the first difference, with what would decide each."""
-    found = next((e for e in result.exhibits if e.anchor == "likely-causes"), None)
-    if found is None:
-        return ()
-    every = found.tables[0].rows
-    first = [r for r in every if r[:2] == every[0][:2]]
-    cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
-    return rows([""] * 3, cells, soft=2)
 
 
 def _ranking(result: Result) -> Passage | None:

@@ -68,10 +68,11 @@ def finish(
     folder.mkdir(parents=True, exist_ok=True)
     here = plan.job.identity()
     found = read_records(folder, (c.key for c in plan.cells), plan.kind, digest(here))
-    records = {
-        c.key: found.records[c.key] for c in plan.cells
-        if c.key in found.records and _says_enough(plan, c, found.records[c.key])
-    }  # fmt: skip
+    records = {}
+    for c in plan.cells:
+        record = found.records.get(c.key)
+        if record and (record.value is None or plan.enough(c, record.value)):
+            records[c.key] = record
     reused = len(records)
     for line in found.doubts:
         LOG.warning(line)
@@ -99,10 +100,6 @@ def finish(
         with Pool(where or Where(), (plan.run.__module__,), shares=plan.shares) as pool:
             said = _run(plan, left, pool, kept, tell, here)
     return Finished(records, reused, perf_counter() - start, said)
-
-
-def _says_enough(plan: Plan[C, R], cell: C, record: Record[R]) -> bool:
-    return record.value is None or plan.enough(cell, record.value)
 
 
 def _run(

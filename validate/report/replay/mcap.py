@@ -134,12 +134,11 @@ def tracks(view: ReplayView) -> tuple[Track, ...]:
         *markers(view),
         *surface(view),
     ]
-    return tuple(t for t in (*transforms(view, found), *found) if not _too_late(t))
-
-
-def _too_late(track: Track) -> bool:
-    """Foxglove's stamps end in 2106; ours do not."""
-    return track.schema in foxglove.SCHEMAS and int(track.ns[-1]) > foxglove.LAST_NS
+    every = (*transforms(view, found), *found)
+    # Foxglove's stamps end in 2106; ours do not
+    return tuple(
+        t for t in every if t.schema not in foxglove.SCHEMAS or int(t.ns[-1]) <= foxglove.LAST_NS
+    )
 
 
 def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
@@ -208,7 +207,10 @@ def _add(panels: dict[str, Json], kind: str, config: Json) -> str:
 
 def _recording(view: ReplayView, tracks: Sequence[Track], panels: dict[str, Json]) -> Json | str:
     """The split of one recording's panels, which are added to `panels`."""
-    beside = [_add(panels, "Image", _image(t)) for t in tracks if t.schema == IMAGE]
+    beside = [
+        _add(panels, "Image", {"imageMode": {"imageTopic": t.topic}, "foxglovePanelTitle": t.topic})
+        for t in tracks if t.schema == IMAGE
+    ]  # fmt: skip
     beside += [_add(panels, "Plot", plot) for plot in _plots(tracks)]
     if not any(t.schema == SCENE for t in tracks):
         return _column(beside)
@@ -244,10 +246,6 @@ def _column(panels: Sequence[str]) -> Json | str:
         return first
     return {"first": first, "second": _column(rest), "direction": "column",
             "splitPercentage": 100 / len(panels)}  # fmt: skip
-
-
-def _image(track: Track) -> Json:
-    return {"imageMode": {"imageTopic": track.topic}, "foxglovePanelTitle": track.topic}
 
 
 def _plots(tracks: Iterable[Track]) -> Iterable[Json]:

@@ -98,15 +98,12 @@ def outlines_over(
             " and the circle through it (dashed, blue). Radius of that circle and rms distance of "
             f"the outline from it: {'; '.join(f'{spaced(h.label)}: {_told(c)}' for h, c in each)}"
         )
-    lines = [
-        [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]
-        + (
-            []
-            if circle is None
-            else [_ImageLine("circle through it", _FITTED, _DASH, _round(circle))]
-        )
-        for hold, circle in zip(holds, circles, strict=True)
-    ]
+    lines = []
+    for hold, circle in zip(holds, circles, strict=True):
+        lines.append([_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)])
+        if circle is not None:
+            around = _MM * (circle.centre[:, None] + circle.radius * _AROUND)
+            lines[-1].append(_ImageLine("circle through it", _FITTED, _DASH, around))
     for drawn, section in zip(lines, simulated[1], strict=False):
         drawn.append(_ImageLine(simulated[0], _SIMULATED, ":", closed(section).T))
     lines[0] += [_marked(mark) for mark in marks]
@@ -207,8 +204,3 @@ def _marked(mark: PlaceSaid) -> _ImageLine:
     if mark.radius is not None:
         points = points + _MM * mark.radius * _AROUND
     return _ImageLine(mark.label, _SAID if mark.certain else _SIMULATED, _DOTS, points)
-
-
-def _round(circle: Circle) -> Floats:
-    """A closed line (2, k) mm."""
-    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * _AROUND))

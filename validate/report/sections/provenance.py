@@ -48,8 +48,17 @@ def _streams(record: Recording, several: bool) -> NumberTable:
     title = (
         f"Streams{name}. Noise: declared standard deviation; gaps: steps over three median steps."
     )
-    rows = tuple((*row, *_clock(record, str(row[0]))) for row in _kinds(record))
-    return NumberTable("", title, _STREAMS, rows, folded=several)
+    rows: list[tuple[Entry | TableCell, ...]] = []
+    for row in _kinds(record):
+        clock = record.clock.get(str(row[0]))
+        if clock is None:
+            rows.append((*row, *(None,) * 5))
+            continue
+        lasts = TableCell(clock.duration, text=text(clock.duration, "1", 4))
+        longest = TableCell(clock.longest_gap, "1")
+        rate = TableCell(clock.rate_hz, "1")
+        rows.append((*row, rate, lasts, clock.gaps, longest, clock.duplicates))
+    return NumberTable("", title, _STREAMS, tuple(rows), folded=several)
 
 
 def _kinds(record: Recording) -> Iterator[tuple[Entry, ...]]:
@@ -67,15 +76,6 @@ def _kinds(record: Recording) -> Iterator[tuple[Entry, ...]]:
 def _points(outlines: tuple[object, ...]) -> str:
     sizes = sorted({len(o) for o in outlines})  # type: ignore[arg-type]
     return str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
-
-
-def _clock(record: Recording, topic: str) -> tuple[Entry | TableCell, ...]:
-    clock = record.clock.get(topic)
-    if clock is None:
-        return (None,) * 5
-    lasts = TableCell(clock.duration, text=text(clock.duration, "1", 4))
-    longest = TableCell(clock.longest_gap, "1")
-    return TableCell(clock.rate_hz, "1"), lasts, clock.gaps, longest, clock.duplicates
 
 
 def _metadata(record: Recording) -> NumberTable:

@@ -126,11 +126,15 @@ def made(
     command = shlex.join(["validate", *map(_told, arguments)]) if arguments else ""
     ours, theirs = commit_of([PACKAGE]), commit_of(sources)
     same = theirs is None or (ours is not None and theirs.sha == ours.sha and not theirs.dirty)
-    files = (*(("experiment", f) for f in sources), *((_role(f), f) for f in meshes))
-    return Made(
-        command, ours, None if same else theirs, code_sha256(),
-        tuple(_used(role, path) for role, path in files),
-    )  # fmt: skip
+    layouts = (".fcsv", ".json")
+    roles = [("experiment", path) for path in sources]
+    roles += [("layout" if p.suffix.lower() in layouts else "mesh", p) for p in meshes]
+    files = []
+    for role, path in roles:
+        with path.open("rb") as stream:
+            sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+        files.append(UsedFile(role, file_name(str(path)), sha256, path.stat().st_size))
+    return Made(command, ours, None if same else theirs, code_sha256(), tuple(files))
 
 
 def _told(argument: str) -> str:
@@ -139,16 +143,6 @@ def _told(argument: str) -> str:
     key, sign, value = (before, equals, after) if equals else ("", "", argument)
     short = str(without_folder(value))
     return argument if short == value else f"{key}{sign}{_LEFT_OUT}{short}"
-
-
-def _role(path: Path) -> str:
-    return "layout" if path.suffix.lower() in (".fcsv", ".json") else "mesh"
-
-
-def _used(role: str, path: Path) -> UsedFile:
-    with path.open("rb") as stream:
-        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-    return UsedFile(role, file_name(str(path)), sha256, path.stat().st_size)
 
 
 def commit_of(paths: Sequence[Path]) -> Commit | None:

@@ -141,8 +141,14 @@ def since(one: PastRun, other: PastRun) -> Since:
     before = {(c.method, c.name): c for c in one.checks}
     for c in other.checks:
         earlier = before.get((c.method, c.name))
-        if earlier and earlier.unit == c.unit:
-            moves += _moves(earlier, c, same=same)
+        if not earlier or earlier.unit != c.unit or earlier.value is None or c.value is None:
+            continue
+        by = abs(c.value - earlier.value)
+        u = math.hypot(earlier.u_num, c.u_num) if same else math.hypot(earlier.u_val, c.u_val)
+        ratio = by / u if u else None
+        if by <= _ROUNDING * max(abs(earlier.value), abs(c.value)):
+            ratio = 0.0
+        moves.append(Move(c.method, c.name, earlier.value, c.value, c.unit, ratio))
     moved = [m for m in moves if m.ratio is None or m.ratio > BEYOND]
     rest = [m.ratio for m in moves if m.ratio is not None and m.ratio <= BEYOND]
     same_code = one.code == other.code and one.commit == other.commit
@@ -157,18 +163,6 @@ def since(one: PastRun, other: PastRun) -> Since:
         within=len(rest),
         most=max(rest, default=0.0),
     )
-
-
-def _moves(one: PastCheck, other: PastCheck, *, same: bool) -> Iterator[Move]:
-    if one.value is None or other.value is None:
-        return
-    by = abs(other.value - one.value)
-    u = math.hypot(one.u_num, other.u_num) if same else math.hypot(one.u_val, other.u_val)
-    if by <= _ROUNDING * max(abs(one.value), abs(other.value)):
-        ratio: float | None = 0.0
-    else:
-        ratio = by / u if u else None
-    yield Move(other.method, other.name, one.value, other.value, other.unit, ratio)
 
 
 def _shown(run: PastRun, beside: PastRun) -> dict[str, str]:

@@ -47,7 +47,16 @@ def laid(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list
         if soft:
             last = soft[-1]
             found = _aligned(head, rows, width, [c for c in columns if c != last], last)
-    return found or [line for row in rows for line in _paragraph(head, row, width)]
+    if found:
+        return found
+    # The first cell, then the others with their names
+    paragraphs = []
+    for first, *others in rows:
+        named = [f"{h}: {cell}" if h else cell for h, cell in zip(head[1:], others, strict=True)]
+        rest = "; ".join(text for text, cell in zip(named, others, strict=True) if cell)
+        paragraphs += wrapped(first, width, _BELOW)
+        paragraphs += wrapped(_BELOW + rest, width, _BELOW) if rest else []
+    return paragraphs
 
 
 def _aligned(
@@ -89,13 +98,3 @@ def _side_by_side(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
     for i in range(max(map(len, parts))):
         line = [part[i] if i < len(part) else "" for part in parts]
         yield _GAP.join(f"{t:<{w}}" for t, w in zip(line, widths, strict=True)).rstrip()
-
-
-def _paragraph(head: Sequence[str], row: Sequence[str], width: int) -> list[str]:
-    """The first cell, then the others with their names."""
-    named = [f"{h}: {cell}" if h else cell for h, cell in zip(head[1:], row[1:], strict=True)]
-    rest = "; ".join(text for text, cell in zip(named, row[1:], strict=True) if cell)
-    return [
-        *wrapped(row[0], width, _BELOW),
-        *(wrapped(_BELOW + rest, width, _BELOW) if rest else []),
-    ]

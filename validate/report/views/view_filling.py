@@ -99,7 +99,10 @@ def filled(view: View, table: LongTable) -> Exhibit:
     groups: dict[str, list[LongRow]] = {}
     for row in found:
         groups.setdefault(_label(row, view.each, table) if view.each else "", []).append(row)
-    parts = [(_named(view, key), rows) for key, rows in groups.items()]
+    parts = []
+    for key, rows in groups.items():  # the name and the title of one of several with the group's
+        name, title = f"{view.name}_{key.replace('.', '_')}", f"{view.title}: {key}"
+        parts.append((replace(view, name=name, title=title) if key else view, rows))
     one = Exhibit(view.name, view.title)
     match view.form:
         case "table":
@@ -115,14 +118,6 @@ def filled(view: View, table: LongTable) -> Exhibit:
             return replace(one, intervals=tuple(b for b in bars if b.labels))
         case "sentences":
             return replace(one, words=tuple(_sentence(view, row, table) for row in found))
-
-
-def _named(view: View, key: str) -> View:
-    """The view of one of several groups: its name and title with the group's."""
-    if not key:
-        return view
-    name = f"{view.name}_{key.replace('.', '_')}"
-    return replace(view, name=name, title=f"{view.title}: {key}")
 
 
 # --- labels and units -----------------------------------------------------------------------------
