@@ -19,7 +19,6 @@ from validate.report.stored.tables import stored_folder
 from validate.report.views.layout import laid, width, wrapped
 from validate.study.stored_runs.score_comparison import (
     Pair,
-    Row,
     SideBySide,
     pairs,
     write_comparison,
@@ -102,10 +101,17 @@ def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[
         title = wrapped(f"One: {pair.one}; other: {pair.other}", columns, "  ")
         room = None if most is None else (most - len(lines)) // (count - i) - len(title) - 1
         # The first rows of the pair that have room, at least one
-        head, cells = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
+        head, cells = ["score", "one", "other", "change", "unit"], []
+        for row in pair.rows:
+            difference, change = row.differences[1] or 0.0, row.changes[1]
+            by = f"{significant(100 * change)} %" if change else text(difference, row.unit)
+            by = f"+{by}" if difference > 0 else by
+            by = "rounding" if change and abs(change) < _ROUNDING else by
+            one, other = (text(value, row.unit) for value in row.values)
+            cells.append([row.score, one, other, by, shown_unit(row.unit)])
         if any(r.method for r in pair.rows):
             head = ["method", *head]
-            cells = [[r.method, *row] for r, row in zip(pair.rows, cells, strict=True)]
+            cells = [[r.method, *cell] for r, cell in zip(pair.rows, cells, strict=True)]
         fitting = len(cells) if room is None else min(len(cells), max(1, room - 1))
         table = laid(head, cells[:fitting], columns)
         while room is not None and len(table) > room and fitting > 1:
@@ -114,15 +120,6 @@ def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[
         lines += [*title, *table, ""]
         rows += fitting
     return lines, rows, count
-
-
-def _row(row: Row) -> list[str]:
-    one, other = row.values
-    difference, change = row.differences[1] or 0.0, row.changes[1]
-    sign = "+" if difference > 0 else ""
-    apart = f"{significant(100 * change)} %" if change else text(difference, row.unit)
-    shown = "rounding" if change and abs(change) < _ROUNDING else f"{sign}{apart}"
-    return [row.score, text(one, row.unit), text(other, row.unit), shown, shown_unit(row.unit)]
 
 
 def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[str]:

@@ -30,7 +30,7 @@ def export(
     Raises `UsageError` where none is requested, or no such run is stored.
     """
     run = stored_folder(name)
-    makers = ((junit_file, _junit), (latex_file, checks_in_latex))
+    makers = ((junit_file, lambda t: junit(content_of(t))), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted and figures is None:
         raise UsageError(
@@ -97,10 +97,6 @@ def _figures(run: Path, folder: Path) -> None:
     write_whole(folder / _LIST, json.dumps(document, indent=1) + "\n")
     replaced = f", {len(gone)} of an earlier export removed" if gone else ""
     say(f"{relative(folder)}: {len(names)} files{replaced}", indent="  ")
-
-
-def _junit(table: LongTable) -> str:
-    return junit(content_of(table))
 
 
 def checks_in_latex(table: LongTable) -> str:

@@ -103,7 +103,10 @@ def styled(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
         given = Style(shade, "-", "o", width)
         drawn[id(s)] = Drawn(s, mine.get(s.label) or turns.get(id(s)) or given, signs.get(id(s), 0))
     lines = {d.series.label: d.look for d in drawn.values() if d.series.style == "line"}
-    drawn |= {id(s): Drawn(s, _of_band(s, lines)) for s in series if s.style == "band"}
+    for s in series:
+        if s.style == "band":
+            own = band_of(s, tuple(lines))
+            drawn[id(s)] = Drawn(s, lines[own] if own else Style(NOISE, "-", "o", 0.0))
     return [drawn[id(s)] for s in series]
 
 
@@ -133,11 +136,6 @@ def is_given(one: Series) -> bool:
     if one.style == "line":
         return one.label.lower().startswith("reference")
     return one.style == "points" and "measured" in one.label.lower()
-
-
-def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
-    own = band_of(band, tuple(lines))
-    return lines[own] if own else Style(NOISE, "-", "o", 0.0)
 
 
 def is_jagged(series: Series) -> bool:

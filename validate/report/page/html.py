@@ -14,14 +14,13 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.compare.exhibit import (
     Chart,
     Entry,
     ImageSeries,
     Intervals,
     Picture,
-    Series,
     TableCell,
     plain,
 )
@@ -311,8 +310,19 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
                 style = "points"
             elif len(parts) > 1:
                 ways = [part[np.argsort(across[part], kind="stable")] for part in parts]
+        given = {"y": drawn.series.y}
+        given |= {} if drawn.series.upper is None else {"upper": drawn.series.upper}
         for way in ways:
-            x, columns = _points(drawn.series, way, least)
+            keep = way
+            if len(way) > _MOST:  # the lowest and the highest of equal parts, and both ends
+                y = drawn.series.y[way]
+                parts = np.array_split(np.arange(len(y)), _MOST // 2)
+                peaks = [i for p in parts for i in (p[y[p].argmin()], p[y[p].argmax()])]
+                keep = way[np.unique([0, *peaks, len(y) - 1])]
+            x, columns = _numbers(across[keep]), {}
+            for name, values in given.items():
+                above = np.where(least and values[keep] < least, np.nan, values[keep])
+                columns[name] = _numbers(above, _SHOWN)
             if x not in xs:
                 xs.append(x)
             series.append({**look, "style": style, "x": xs.index(x), **columns})
@@ -321,23 +331,6 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
         "series": series,
         "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
     }  # fmt: skip
-
-
-def _points(
-    series: Series, order: Ints, least: float
-) -> tuple[list[float | None], dict[str, list[float | None]]]:
-    keep = order
-    if len(order) > _MOST:  # the lowest and the highest of equal parts, and both ends
-        y = series.y[order]
-        parts = np.array_split(np.arange(len(y)), _MOST // 2)
-        peaks = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
-        keep = order[np.unique([0, *peaks, len(y) - 1])]
-    columns = {"y": series.y} | ({} if series.upper is None else {"upper": series.upper})
-    found = {
-        name: _numbers(np.where(least and y[keep] < least, np.nan, y[keep]), _SHOWN)
-        for name, y in columns.items()
-    }
-    return _numbers(series.x[keep]), found
 
 
 def _numbers(values: Floats, digits: int = _DIGITS) -> list[float | None]:
