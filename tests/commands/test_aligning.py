@@ -16,7 +16,8 @@ from validate.recording.mcap.read import read_recording
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Frames, Markers, Recording, Signal, Source
 
-# private: _drift: called alone, case by case.
+# private: _aligned: called alone, case by case.
+# private: _offset: replaced, to bring a case about.
 
 OFFSET = 0.7318  # s by which the markers' clock is behind
 _GRID = np.arange(-5.0, 65.0, 0.01)
@@ -235,11 +236,15 @@ def test_a_drift_that_half_a_recording_cannot_determine_is_reported(
     def unknown(*_: object) -> None:
         raise RecordingError("7 samples meet the reference, 10 are needed")
 
+    offset = SimpleNamespace(seconds=0.0, sd=0.1, method="correlation", count=9, coverage=1.0)
     monkeypatch.setattr(aligning, "drift_of", unknown)
-    pair = SimpleNamespace(reference=None, stream=None)
-    assert aligning._drift(pair, None, "b.mcap: ") is None  # type: ignore[arg-type]
+    monkeypatch.setattr(aligning, "_offset", lambda *_: offset)
+    monkeypatch.setattr(aligning, "correlation_at", lambda *_: 0.9)
+    pair = SimpleNamespace(file=Path("b.mcap"), reference=None, stream=None)
+    how = SimpleNamespace(event=None, straighten=True)
+    assert aligning._aligned(pair, how, several=True) == (pair, offset, None)  # type: ignore[arg-type]
     said = " ".join(capsys.readouterr().out.split())
-    assert (
-        said == "b.mcap: drift: not known: half of the recording is not enough (7 samples "
-        "meet the reference, 10 are needed)"
+    assert said.startswith(
+        "b.mcap: drift: not known: half of the recording is not enough (7 samples meet the "
+        "reference, 10 are needed) b.mcap: offset"
     )

@@ -55,8 +55,8 @@ from validate.scene.geometries.box import box
 from validate.scene.mesh_files.third_party_meshes import ForeignBody
 
 # private: _MAX_TABLE: replaced by a small number: a short test.
-# private: _along, _content, _declared, _drawn, _holds, _metres, _part, _pictured, _place,
-#   _running, _same, _seen, _table: called alone, case by case.
+# private: _content, _document, _drawn, _found, _metres, _part, _running, _seen: called alone,
+#   case by case.
 # private: _judged: replaced, to bring a case about.
 
 COARSE = [
@@ -323,10 +323,10 @@ def test_check_of_an_experiment_without_printed_figures_rests_on_its_checks(
     phantom_result: Result,
 ) -> None:
     bare = replace(phantom_result, published=())
-    assert checking._holds(checking._content(bare), declared=False)
-    assert not checking._holds(checking._content(bare), declared=True)
+    assert checking._document(checking._content(bare), declared=False)["holds"]
+    assert not checking._document(checking._content(bare), declared=True)["holds"]
     nothing = checking._content(replace(bare, methods=()))
-    assert not checking._holds(nothing, declared=False)
+    assert not checking._document(nothing, declared=False)["holds"]
 
 
 @pytest.mark.parametrize(
@@ -387,13 +387,14 @@ def test_places_that_cannot_be_known_are_refused(
 ) -> None:
     file = tmp_path / "wires.csv"
     file.write_text("target,x,y,z,x2,y2,z2\nw,1,2,3,1,2,3\n")
-    row = known_places.rows_of(file, ("target", "x"))[0]
     with pytest.raises(RecordingError, match=r"wires.csv: wire w has two equal ends"):
-        known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 3e-3]))
-    assert known_places._along(file, {**row, "x2": " "}, 1.0, np.zeros(3)) is None
-    along = known_places._along(file, row, 1e-3, np.array([1e-3, 2e-3, 0.0]))
-    assert along is not None
-    assert along.tolist() == [0.0, 0.0, 1.0]
+        known_places.known_places(file, "mm")
+    whole = tmp_path / "whole.csv"
+    whole.write_text("target,x,y,z,x2,y2,z2\np,1,2,3, ,,\nw,1,2,0,1,2,3\n")
+    point, wire = known_places.known_places(whole, "mm")
+    assert point.along is None
+    assert wire.along is not None
+    assert wire.along.tolist() == [0.0, 0.0, 1.0]
     with pytest.raises(RecordingError, match=r"none.csv: cannot be read \(No such file"):
         known_places.rows_of(tmp_path / "none.csv", ("target",))
     monkeypatch.setattr(known_places, "_MAX_TABLE", 20)
@@ -401,17 +402,21 @@ def test_places_that_cannot_be_known_are_refused(
         known_places.rows_of(file, ("target",))
     monkeypatch.setattr(known_places, "read_device_set", lambda _: SimpleNamespace(landmarks={}))
     with pytest.raises(UsageError, match=r"d.xml: .* no landmarks"):
-        known_places._declared(tmp_path / "d.xml")
+        known_places.known_places(tmp_path / "d.xml", None)
+
+
+OUTLINE = dict.fromkeys(("sd", "unit", "label", "centre", "radius"))
 
 
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: known_places._table(Path("w.csv"), "kg"), "--unit kg: expected a unit of length, "
-                                                           "as mm"),
+        (lambda: known_places.known_places(Path(os.devnull), "kg"), "--unit kg: expected a unit of "
+                                                                    "length, as mm"),
         (lambda: bodies._metres("edge", "2"), "--edge 2: expected a length with its unit, as 2mm"),
         (lambda: bodies._metres("edge", "-2mm"), "--edge -2mm: expected a length with its unit"),
-        (lambda: outlining._place("3px", None), "--centre 3px: expected X,Y as 120px,80px or"),
+        (lambda: outlining._found(None, "", {**OUTLINE, "centre": "3px"}),
+         "--centre 3px: expected X,Y as 120px,80px or"),
         (
             lambda: outlining._drawn(Path("a"), None, "", {"centre": "1px,1px", "radius": 0,
                                                            "bright": False}),
@@ -488,7 +493,7 @@ def test_a_body_that_is_not_held_or_not_compared_is_no_experiment(
 
 
 def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     poses = {"a": np.arange(3.0), "b": np.arange(3.0) + 0.5}
 
@@ -499,16 +504,9 @@ def test_tools_that_are_never_tracked_together_and_files_that_would_lose_topics(
     with pytest.raises(UsageError, match=r"'a' and 'b' are never visible"):
         tool_poses.in_reference(None, "a", "b")  # type: ignore[arg-type]
     partly = SimpleNamespace(unread={"/x": "", "/y": ""})
+    monkeypatch.setattr(outlining, "read_recording", lambda file: partly)
     with pytest.raises(UsageError, match=r"a\.mcap has 2 topics that are not read"):
-        outlining._same(Path("a.mcap"), partly)  # type: ignore[arg-type]
-    whole = SimpleNamespace(unread={})
-    assert outlining._same(Path("a.mcap"), whole) == Path("a.mcap")  # type: ignore[arg-type]
-    frames = SimpleNamespace()
-    monkeypatch.setattr(outlining, "outlines_over", lambda *_, **__: (None, None))
-    monkeypatch.setattr(outlining, "png", lambda picture: b"")
-    contours = SimpleNamespace(t=np.zeros(1))
-    with pytest.raises(RecordingError, match=r"a\.png: cannot be written"):
-        outlining._pictured(frames, contours, tmp_path / "no" / "a.png", ())  # type: ignore[arg-type]
+        outlining.outline(Path("a.mcap"), None, "", "", None, {})
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "inf", "nan"])

@@ -6,12 +6,11 @@ import pytest
 
 from validate.commands import list as listing
 
-# private: _details, _summary: replaced, to bring a case about.
+# private: _document: replaced, to bring a case about.
 
 
 def test_a_number_that_is_none_is_never_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(listing, "find", lambda *_: SimpleNamespace())
-    monkeypatch.setattr(listing, "_summary", lambda experiment: {"limit": float("nan")})
-    monkeypatch.setattr(listing, "_details", lambda experiment: {})
+    monkeypatch.setattr(listing, "_document", lambda experiment: {"limit": float("nan")})
     with pytest.raises(ValueError, match="not JSON compliant"):
         listing.show("cube", (), as_json=True)

@@ -13,8 +13,6 @@ from validate.commands.questions import plates as new_plates
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
 
-# private: _of_the_sizes: replaced, to bring a case about.
-
 ANSWERS = 'experiment = "plates"\ntest = "compression"\naccept.force = "0.1N"\n'
 
 
@@ -97,7 +95,7 @@ def test_a_bug_is_70_with_its_traceback(
     def broken(*arguments: object) -> NoReturn:
         raise ZeroDivisionError("a bug")
 
-    monkeypatch.setattr(new_plates, "_of_the_sizes", broken)
+    monkeypatch.setattr(new_plates, "mesh_questions", broken)
     code, _, err = here(*arguments("--answers", "a.toml"))
     assert code == 70
     assert "Traceback" in err

@@ -85,6 +85,13 @@ def test_an_outline_is_followed_into_the_recording_itself(moving: Path) -> None:
     assert moving.with_name("a-outline.png").stat().st_size > 20_000
 
 
+def test_a_picture_that_cannot_be_written_is_refused(moving: Path, tmp_path: Path) -> None:
+    (tmp_path / "c-outline.png").mkdir()
+    code, _, err = here("outline", str(moving), "-o", str(tmp_path / "c.mcap"))
+    assert code == 2
+    assert "c-outline.png: cannot be written" in err
+
+
 @pytest.mark.slow
 def test_an_outline_that_was_found_before_is_made_anew(moving: Path) -> None:
     for _ in range(2):

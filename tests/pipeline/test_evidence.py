@@ -29,7 +29,7 @@ from validate.recording.types import Recording
 from validate.scene.material import Material
 from validate.scene.scene import Scene
 
-# private: _content, _holds: called alone, case by case.
+# private: _content, _document: called alone, case by case.
 
 RECORDINGS = Path(__file__).parents[2] / "recordings"
 FEM = {"fem": TINY.methods["fem"]}
@@ -255,10 +255,11 @@ def test_a_declared_verdict_is_as_expected_though_the_run_fails(known: Result) -
 
 
 def test_check_holds_the_declared_verdict_and_fails_where_it_moves(known: Result) -> None:
-    assert checking._holds(checking._content(known), declared=False)
+    assert checking._document(checking._content(known), declared=False)["holds"]
     moved = replace(known, expected=(Expected("good enough", "it was"),))
-    assert not checking._holds(checking._content(moved), declared=False)
-    assert not checking._holds(checking._content(replace(known, expected=())), declared=False)
+    assert not checking._document(checking._content(moved), declared=False)["holds"]
+    bare = checking._content(replace(known, expected=()))
+    assert not checking._document(bare, declared=False)["holds"]
 
 
 def test_declared_verdicts_are_those_of_what_is_shipped() -> None:

@@ -16,13 +16,12 @@ from validate.compare.result import Result
 from validate.fem.assembly.locate import Rows, nearest_node_rows
 from validate.register.markers.displacements import DisplacementObservation
 from validate.register.markers.markers import MarkerObservation
-from validate.report.scenes import gl
-from validate.report.scenes.bodies import _without_gl
+from validate.report.scenes import bodies, gl
 from validate.report.scenes.body import camera
 from validate.report.scenes.body_scene import BodyScene, _particles, body_scene, fields
 
 # private: _KNOWN: a cache, emptied.
-# private: _particles, _without_gl: called alone, case by case.
+# private: _particles: called alone, case by case.
 
 
 def cube() -> BodyScene:
@@ -136,8 +135,10 @@ def test_a_camera_holds_its_points_and_looks_along_the_drive() -> None:
     assert flat.away.tolist() == [0, 0, 1]
 
 
-def test_drawn_body_follows_the_displacement() -> None:
-    one, two = (_without_gl(s) for s in (cube(), body_scene(scaled(small_result(), 2.0), 4)) if s)
+def test_drawn_body_follows_the_displacement(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gl, "available", lambda: False)
+    parts = [bodies.body(r) for r in (small_result(), scaled(small_result(), 2.0))]
+    one, two = (part.pictures[0] for part in parts if part)
     assert two.pixels.shape == one.pixels.shape
     assert (two.pixels != one.pixels).any()
 

@@ -17,7 +17,7 @@ from validate.report.stored import environment as module
 from validate.report.stored.environment import Commit, Made, UsedFile, commit_of, environment, made
 from validate.report.stored.store import document, schema
 
-# private: _memory, _version: called alone, case by case.
+# private: _version: called alone, case by case.
 
 CREATED = "2026-11-21T04:00:00Z"
 
@@ -154,8 +154,8 @@ def test_a_machine_that_does_not_say_its_memory(
         raise error(name)
 
     monkeypatch.setattr(module.os, "sysconf", unknown)
-    assert module._memory() == "unknown"
+    assert module.environment()["memory"] == "unknown"
     sizes = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 2**20}
     monkeypatch.setattr(module.os, "sysconf", sizes.__getitem__)
-    assert module._memory() == "4.0 GiB"
+    assert module.environment()["memory"] == "4.0 GiB"
     assert module._version("no-such-distribution") == "not installed"

@@ -17,7 +17,7 @@ from validate.report.page.html import page
 from validate.report.sections.verdicts import band
 from validate.report.stored.store import document, schema
 
-# private: _content, _document, _holds, _show: called alone, case by case.
+# private: _content, _document, _show: called alone, case by case.
 
 CREATED = "2026-11-21T04:00:00Z"
 HELD = replace(PRINTED, expected=4.0, drift=0.01)
@@ -100,13 +100,13 @@ def test_a_figure_that_does_not_stand_fails_the_check_and_not_the_run(
     result = showing(STATES[line])
     assert result.passed
     assert document(result, CREATED)["passed"]
-    assert checking._holds(checking._content(result), declared=False) is stands
+    assert checking._document(checking._content(result), declared=False)["holds"] is stands
 
 
 def test_figures_of_other_data_alone_hold_nothing() -> None:
-    assert checking._holds(checking._content(showing(HELD)), declared=True)
+    assert checking._document(checking._content(showing(HELD)), declared=True)["holds"]
     other = checking._content(showing(STATES["other data"]))
-    assert not checking._holds(other, declared=True)
+    assert not checking._document(other, declared=True)["holds"]
 
 
 def test_both_json_documents_hold_what_the_verdicts_rest_on() -> None:

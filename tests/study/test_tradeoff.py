@@ -13,7 +13,6 @@ from scipy import sparse
 
 from validate.commands import study as studying
 from validate.commands.main import run
-from validate.commands.screen import show
 from validate.engine.cell import Plan, Record, Where
 from validate.engine.execution import finish
 from validate.errors import ComparisonError, SceneError, UsageError
@@ -48,10 +47,10 @@ from validate.study.tradeoff.exhibits import trade_exhibits
 from validate.study.tradeoff.page import cells_table, trade_document
 from validate.study.tradeoff.study import Trade, TradeRow, front, trade_cells, traded
 
-# private: _choice_passages, _locking, _measured, _predicted, _sharing, _solved, _trade_passages:
-#   called alone, case by case.
+# private: _locking, _measured, _predicted, _sharing, _solved: called alone, case by case.
 # private: _march, _scheme: replaced, to bring a case about.
 
+OPTIONS = studying.StudyOptions(None, False, None, "", False)
 STEPS = (0.02, 0.01, 0.005)
 STATIC = Rival("static", "static superposition", lambda dt: QuasiStatic(), stepped=False)
 AVERAGE = Rival("average", "prefactored", Newmark)
@@ -402,7 +401,11 @@ def test_a_row_of_the_front_in_its_own_units(
     assert told["rate / Hz"] == pytest.approx(2.5e5)
     assert told["error / mm"] == pytest.approx(2.0)
     assert told["of the motion / %"] == pytest.approx(0.2 / measured.moved)
-    show(studying._trade_passages(found))
+    shown = Made(found=found, page=Path("report.html"))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(studies, "tradeoff", lambda *_: shown)
+        patch.setattr(studying, "find", lambda *_: None)
+        assert studying.tradeoff("", OPTIONS) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines.count(["fast", "P1", "1", "2.00", "4.00"]) == 2
 
@@ -413,10 +416,14 @@ def test_a_ladder_has_the_error_of_its_rungs(
     best = timed("fast", 2e-3, 4e-6)
     rungs = (Made(rung="modal", verdict="meets", best=best, evidence="one"),
              Made(rung="large", verdict="nothing ran", best=None, evidence="none"))  # fmt: skip
-    choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=(), excluded=())
+    choice = Made(trade=measured, facts=(), ladder=rungs, by="error", rejected=(), excluded=(),
+                  pick=None)  # fmt: skip
+    shown = Made(found=choice, page=Path("report.html"))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studying, "words", lambda choice: iter(["none"]))
-        show(studying._choice_passages(choice))
+        patch.setattr(studies, "choice", lambda *_, **__: shown)
+        patch.setattr(studying, "find", lambda *_: None)
+        assert studying.choosing("", OPTIONS, error="", rate="", declared_law=False) == 1
     found = capsys.readouterr().out.split("Candidate methods")[1]
     modal, large = (next(x for x in found.splitlines() if r in x) for r in ("modal", "large"))
     assert modal.split() == ["modal", "2.00", "meets"]

@@ -118,7 +118,14 @@ def _aligned(
     """The pair as it is written, its offset, and the drift that is taken out; all are told."""
     offset = _offset(pair.reference, pair.stream, wanted)
     prefix = f"{pair.file.name}: " if several else ""
-    drift = None if wanted.event else _drift(pair, offset, prefix)
+    drift = None
+    if not wanted.event:
+        try:
+            drift = drift_of(pair.reference, pair.stream, offset)
+            rate = f"{1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm"
+        except RecordingError as error:
+            rate = f"not known: half of the recording is not enough ({error})"
+        say(f"{prefix}drift: {rate}", indent="  ")
     if drift is not None and wanted.straighten:
         pair = replace(pair, stream=stretched_signal(pair.stream, drift))
         offset = _offset(pair.reference, pair.stream, wanted)
@@ -144,15 +151,3 @@ def _offset(reference: Signal, stream: Signal, wanted: HowAligned) -> Offset:
     longest = float(max(np.ptp(reference.t), np.ptp(stream.t)))
     within = wanted.within or longest
     return Offset.by_correlation(reference, stream, within, wanted.coverage, wanted.correlation)
-
-
-def _drift(pair: _Pair, offset: Offset, prefix: str) -> ClockDrift | None:
-    try:
-        drift = drift_of(pair.reference, pair.stream, offset)
-        told = f"{1e6 * drift.rate:+.4g} ppm, sd {1e6 * drift.sd:.2g} ppm"
-        say(f"{prefix}drift: {told}", indent="  ")
-        return drift
-    except RecordingError as error:
-        why = f"not known: half of the recording is not enough ({error})"
-        say(f"{prefix}drift: {why}", indent="  ")
-        return None

@@ -8,7 +8,6 @@ from validate.commands.display import say, table
 from validate.errors import SceneError, UsageError
 from validate.places import try_file
 from validate.scene.body_facts import POOR, SAME, facts, largest_side, odd_size, quality
-from validate.scene.mesh import Mesh
 from validate.scene.mesh_files.mesh_file import SUFFIXES as SURFACES
 from validate.scene.mesh_files.mesh_file import filled, read_mesh, write_mesh
 from validate.scene.mesh_files.meshio_arrays import SURFACE
@@ -39,7 +38,20 @@ def body(
     if out is not None:
         try_file(out)
     found = _read(file, unit, edge, part)
-    _require_size(file, found.mesh, unit, size)
+    # Refuse a body of another size than given, and one of an unusual size that is not confirmed
+    side = largest_side(found.mesh)
+    if size is not None:
+        if abs(_metres("size", size) / side - 1) > SAME:
+            raise UsageError(
+                f"{file.name}: --size {size}: the largest side is {1e3 * side:.4g} mm in "
+                f"{unit or 'm'}; check --unit and --size"
+            )
+    elif odd := odd_size(found.mesh, unit or "m"):
+        other = "another --unit" if unit else "nodes in m"
+        raise UsageError(
+            f"{file.name}: the body is {odd}: give {other}, or confirm its largest side: "
+            f"--size {1e3 * side:.4g}mm"
+        )
     # Facet sets by name, each where its words say
     places = pairs(faces, "--face")
     chosen = {
@@ -89,24 +101,6 @@ def _read(file: Path, unit: str | None, edge: str | None, part: str | None) -> F
     if suffix in FOREIGN:
         return read_foreign(file, unit, part)
     return _part(file, filled(file, unit, _metres("edge", edge) if edge else 0.0), part)
-
-
-def _require_size(file: Path, mesh: Mesh, unit: str | None, size: str | None) -> None:
-    """Refuse a body of an unusual size that is not confirmed, and of another size than said."""
-    side = largest_side(mesh)
-    if size is not None:
-        if abs(_metres("size", size) / side - 1) > SAME:
-            raise UsageError(
-                f"{file.name}: --size {size}: the largest side is {1e3 * side:.4g} mm in "
-                f"{unit or 'm'}; check --unit and --size"
-            )
-        return
-    if odd := odd_size(mesh, unit or "m"):
-        other = "another --unit" if unit else "nodes in m"
-        raise UsageError(
-            f"{file.name}: the body is {odd}: give {other}, or confirm its largest side: "
-            f"--size {1e3 * side:.4g}mm"
-        )
 
 
 def _part(file: Path, found: ForeignBody, part: str | None) -> ForeignBody:

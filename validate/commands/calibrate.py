@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.commands.arguments import complain
 from validate.commands.digitise import LEAST, RADIUS, known_places, number, rows_of
 from validate.commands.display import say, table
@@ -100,7 +100,14 @@ def _seen(
     rows = rows_of(file, ("image", "u", "v", "target"))
     if not rows:
         raise UsageError(f"{file.name}: the file has no marked points; add one row per point")
-    turns, shifts = _poses(recording, frames, probe)
+    # The probe's rotations (n, 3, 3) and places (n, 3) m at the images, NaN where it was not seen
+    t, R, T = tool_poses(recording, probe)
+    distance = np.abs(t[None] - frames.t[:, None])
+    nearest = distance.argmin(axis=1)
+    period = float(np.median(np.diff(frames.t))) if len(frames.t) > 1 else 0
+    late = distance.min(axis=1) > max(_APART * period, 1e-9)
+    turns, shifts = R[nearest].copy(), T[nearest].copy()
+    turns[late], shifts[late] = np.nan, np.nan
     px, image, targets = [], [], []
     for row in rows:
         name = (row["target"] or "").strip()
@@ -120,21 +127,6 @@ def _seen(
     return SeenPoints(np.array(px), i, tuple(targets), turns[i], shifts[i])
 
 
-def _poses(recording: Recording, frames: Frames, probe: str) -> tuple[Floats, Floats]:
-    """The probe's rotations (n, 3, 3) and places (n, 3) m at the images, NaN where it was not
-    seen."""
-    t, turned, moved = tool_poses(recording, probe)
-    near = np.abs(t[None] - frames.t[:, None])
-    at, period = (
-        near.argmin(axis=1),
-        float(np.median(np.diff(frames.t))) if len(frames.t) > 1 else 0,
-    )
-    late = near[np.arange(len(at)), at] > max(_APART * period, 1e-9)
-    R, T = turned[at].copy(), moved[at].copy()
-    R[late], T[late] = np.nan, np.nan
-    return R, T
-
-
 def calibrate_tip(file: Path, out: Path, tool: str, reference: str, rough: str) -> None:
     """Finds where the tip of `tool` is, and writes its path with that.
 
@@ -144,7 +136,16 @@ def calibrate_tip(file: Path, out: Path, tool: str, reference: str, rough: str) 
     try_file(out)
     recording = read_recording(file)
     t, R, T, frame = in_reference(recording, tool, reference)
-    kept, point = _points(t, R, T, rough)
+    # The poses that count, and which point each stands on
+    kept, point = np.arange(len(t)), np.zeros(len(t), dtype=np.int64)
+    if rough:
+        parts = Dwell.of_path(t, R @ tip_offset(rough) + T, RADIUS, LEAST)
+        if not parts:
+            raise UsageError(
+                f"the tip never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s; check --tip"
+            )
+        kept = np.concatenate([np.arange(d.begin, d.end) for d in parts])
+        point = np.repeat(np.arange(len(parts)), [d.end - d.begin for d in parts])
     found = pivot(R[kept], T[kept], point)
     for key, text in _tip_record(found).items():
         say(f"{key}: {text}", indent="  ")
@@ -171,17 +172,3 @@ def _tip_record(found: Pivot) -> dict[str, str]:
         f"{len(found.off)} poses about {len(found.points)} points",
         "turns": f"{turns} degrees rms in the three directions",
     }
-
-
-def _points(t: Floats, R: Floats, T: Floats, rough: str) -> tuple[Ints, Ints]:
-    """The poses that count, and which point each stands on."""
-    if not rough:
-        return np.arange(len(t)), np.zeros(len(t), dtype=np.int64)
-    tip = tip_offset(rough)
-    parts = Dwell.of_path(t, R @ tip + T, RADIUS, LEAST)
-    if not parts:
-        raise UsageError(
-            f"the tip never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s; check --tip"
-        )
-    at = [np.arange(d.begin, d.end) for d in parts]
-    return np.concatenate(at), np.repeat(np.arange(len(at)), [len(i) for i in at])

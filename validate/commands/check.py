@@ -22,7 +22,7 @@ from validate.library.single_run import by_cells
 from validate.pipeline.bodies.first_modes import assumed_density, first_frequencies
 from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.options import Options
-from validate.pipeline.experiment.origins import Opened, opened
+from validate.pipeline.experiment.origins import opened
 from validate.pipeline.experiment.tree import Tree
 from validate.pipeline.run.cached_runs import stored_run
 from validate.pipeline.run.cells import InStore
@@ -54,11 +54,26 @@ def check(
     no figure moved and every verdict is the declared one."""
     found: list[Json] = []
     figures: list[Json] = []
-    reports = _writable(reports_of(None, out), out)
+    home, reports = reports_of(None, out), None
+    try:
+        try_results(home / FOLDER, ())
+        reports = home
+    except UsageError as error:
+        if out:
+            raise
+        complain(f"no page of printed figures: {error}")
 
     def one(experiment: Experiment) -> bool:
-        content = None if fresh else _stored(experiment, out)
-        if content is None:
+        content, why = None, ""
+        if not fresh:  # the stored run, where it would be made again from the same
+            folder = run_folder(experiment, Options({}), out)
+            content, why = stored_run(experiment, folder)
+        if content is not None:
+            run = f"stored run of {content['created']} ({relative(folder)})"
+            say(f"{experiment.name}: {run}; --fresh repeats it", error=True)
+        else:
+            if why:
+                say(f"{experiment.name}: run again: {why}", error=True)
             with (
                 TemporaryDirectory(prefix="validate-") as empty,
                 progress(f"check {experiment.name}") as report,
@@ -95,31 +110,6 @@ def check(
     return code
 
 
-def _writable(reports: Path, out: Path | None) -> Path | None:
-    """The folder of reports; None, and a line, where nothing can be written and `out` is not asked
-    for."""
-    try:
-        try_results(reports / FOLDER, ())
-    except UsageError as error:
-        if out:
-            raise
-        complain(f"no page of printed figures: {error}")
-        return None
-    return reports
-
-
-def _stored(experiment: Experiment, out: Path | None) -> Json | None:
-    """The content of the run's results.json where it would be made again from the same."""
-    folder = run_folder(experiment, Options({}), out)
-    content, why = stored_run(experiment, folder)
-    if content is not None:
-        when, where = content["created"], relative(folder)
-        say(f"{experiment.name}: stored run of {when} ({where}); --fresh repeats it", error=True)
-    elif why:
-        say(f"{experiment.name}: run again: {why}", error=True)
-    return content
-
-
 def _content(result: Result) -> Json:
     """What of results.json is shown here."""
     return {
@@ -139,25 +129,24 @@ def _content(result: Result) -> Json:
 
 
 def _document(content: Json, *, declared: bool) -> Json:
+    """Return the document of one experiment.
+
+    It holds where verdicts are the declared ones (none declared: the run passed) and figures stand;
+    an experiment that declares figures must have held some.
+    """
+    held_some = any(not p["other"] for p in content["published"]) or not declared
+    checks = [{"method": m["name"], **c} for m in content["methods"] for c in m["checks"]]
+    as_declared = not content["moved"] if content["expected"] else bool(content["passed"])
+    fallen = any(p["fault"] for p in content["published"])
     return {
         "experiment": content["experiment"],
-        "holds": _holds(content, declared=declared),
+        "holds": bool(checks) and as_declared and held_some and not fallen,
         "expected": content["expected"],
         "moved": content["moved"],
         "stored": content["created"],
         "published": content["published"],
-        "checks": [{"method": m["name"], **c} for m in content["methods"] for c in m["checks"]],
+        "checks": checks,
     }
-
-
-def _holds(content: Json, *, declared: bool) -> bool:
-    """Verdicts are the declared ones (none declared: the run passed) and figures stand; an
-    experiment that declares figures must have held some."""
-    held_some = any(not p["other"] for p in content["published"]) or not declared
-    checked = any(m["checks"] for m in content["methods"])
-    as_declared = not content["moved"] if content["expected"] else bool(content["passed"])
-    fallen = any(p["fault"] for p in content["published"])
-    return checked and as_declared and held_some and not fallen
 
 
 def _show(content: Json, document: Json, detail: Detail = "screen") -> None:
@@ -210,20 +199,19 @@ def described(experiment: Experiment) -> tuple[str, ...]:
     except ValidateError:
         return ()
     lines = motion_lines(found.recordings[0]) if found.recordings else ()
-    return (*lines, *_modes(experiment, found)) if lines else ()
-
-
-def _modes(experiment: Experiment, found: Opened) -> tuple[str, ...]:
-    """Of the first model; empty without one of known modulus that is held."""
     p = found.parameters
-    if isinstance(p, Tree) and isinstance(p.scene, Scene) and p.scene.material.E is None:
-        return ()
+    unknown = isinstance(p, Tree) and isinstance(p.scene, Scene) and p.scene.material.E is None
+    if not lines or unknown:
+        return lines
+    # Modes of the first model; none of a body that nothing holds
     model = next(iter(experiment.methods.values())).scene
     try:
         scene = experiment.build(found.recordings[0], p, model)
         modes = first_frequencies(scene) if isinstance(scene, Scene) else ()
     except (ValidateError, np.linalg.LinAlgError):
-        return ()
+        modes = ()
+    if not modes:
+        return lines
     words = ", ".join(f"{f:.3g}" for f in modes)
     assumed = assumed_density(p)
-    return (f"first modes of the body: {words} Hz{assumed and f' ({assumed})'}",) if modes else ()
+    return (*lines, f"first modes of the body: {words} Hz{assumed and f' ({assumed})'}")

@@ -19,7 +19,6 @@ from validate.report.stored.tables import stored_folder
 from validate.report.views.layout import laid, width, wrapped
 from validate.study.stored_runs.score_comparison import (
     Pair,
-    Row,
     SideBySide,
     pairs,
     write_comparison,
@@ -51,7 +50,16 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
         everything = wanted.everything
         columns = width(sys.stdout)
         warnings = sentences(f"warning: {w}" for w in found.warnings).laid(whole=everything)
-        head = [*sentences([_headline(found)]).laid(whole=True).lines, *warnings.lines]
+        headline = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
+        errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
+        changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
+        if changed:
+            _, change, row = max(changed, key=lambda c: c[0])
+            name = f"{row.method}: {row.score}" if row.method else row.score
+            headline += f"; largest change: {name}, {100 * change:+.3g} %."
+        else:
+            headline += "; no error changed."
+        head = [*sentences([headline]).laid(whole=True).lines, *warnings.lines]
         parameters = _parameters(found, columns, everything=everything)
         shown, more, unseen = pairs(found, every=everything)
         room = None if everything else max(6, LINES - len(head) - len(parameters) - 4)
@@ -64,42 +72,24 @@ def compare(names: tuple[str, ...], wanted: Shown, out: Path | None, *, as_json:
         if what := ", ".join(f"{n} {word}" for word, n in counts.items() if n):
             say(f"left out: {what}; --all, --method, --score or --json show them")
     if out or not as_json:
-        page = _drawn(found, paths, wanted, out)
-        if page and not as_json:
-            say(f"charts and all scores: {relative(page)}")
-
-
-def _drawn(
-    found: SideBySide, paths: tuple[Path, ...], wanted: Shown, out: Path | None
-) -> Path | None:
-    """The page below `out`, else beside the first run; none, and a line, where that is closed."""
-    beside = paths[0].resolve()
-    beside = (beside if beside.is_dir() else beside.parent).parent
-    # One folder for one comparison: of these runs, filtered and sorted so
-    first = found.runs[0].name.partition("+")[0]
-    made = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
-    mark = sha256(json.dumps(made).encode()).hexdigest()[:6]
-    folder = (out or beside) / f"compare-{first[:60]}-{mark}"
-    try:
-        try_results(folder, ())
-    except UsageError as error:
-        if out:
-            raise
-        complain(f"no charts: {error}")
-        return None
-    return write_comparison(found, document(found), folder)
-
-
-def _headline(found: SideBySide) -> str:
-    """How many scores of how many runs, and which one changed most between two of them."""
-    count = f"{len(found.rows)} scores of {len(found.runs)} runs compared"
-    errors = [r for r in found.rows if r.unit != "s"]  # times change with every run
-    changed = [(abs(c), c, r) for r in errors for c in r.changes if c]
-    if not changed:
-        return f"{count}; no error changed."
-    _, change, row = max(changed, key=lambda c: c[0])
-    name = f"{row.method}: {row.score}" if row.method else row.score
-    return f"{count}; largest change: {name}, {100 * change:+.3g} %."
+        # A page below `out`, else beside the first run: one folder for one comparison, which is of
+        # these runs, filtered and sorted so
+        beside = paths[0].resolve()
+        beside = (beside if beside.is_dir() else beside.parent).parent
+        first = found.runs[0].name.partition("+")[0]
+        settings = [[str(p.resolve()) for p in paths], wanted.methods, wanted.scores, wanted.sort]
+        mark = sha256(json.dumps(settings).encode()).hexdigest()[:6]
+        folder = (out or beside) / f"compare-{first[:60]}-{mark}"
+        try:
+            try_results(folder, ())
+        except UsageError as error:
+            if out:
+                raise
+            complain(f"no charts: {error}")
+        else:
+            page = write_comparison(found, document(found), folder)
+            if not as_json:
+                say(f"charts and all scores: {relative(page)}")
 
 
 def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[str], int, int]:
@@ -110,33 +100,26 @@ def _pairs(shown: Sequence[Pair], columns: int, most: int | None) -> tuple[list[
     for i, pair in enumerate(shown[:count]):
         title = wrapped(f"One: {pair.one}; other: {pair.other}", columns, "  ")
         room = None if most is None else (most - len(lines)) // (count - i) - len(title) - 1
-        found, held = _fitting(pair, columns, room)
-        lines += [*title, *found, ""]
-        rows += held
+        # The first rows of the pair that have room, at least one
+        head, cells = ["score", "one", "other", "change", "unit"], []
+        for row in pair.rows:
+            difference, change = row.differences[1] or 0.0, row.changes[1]
+            by = f"{significant(100 * change)} %" if change else text(difference, row.unit)
+            by = f"+{by}" if difference > 0 else by
+            by = "rounding" if change and abs(change) < _ROUNDING else by
+            one, other = (text(value, row.unit) for value in row.values)
+            cells.append([row.score, one, other, by, shown_unit(row.unit)])
+        if any(r.method for r in pair.rows):
+            head = ["method", *head]
+            cells = [[r.method, *cell] for r, cell in zip(pair.rows, cells, strict=True)]
+        fitting = len(cells) if room is None else min(len(cells), max(1, room - 1))
+        table = laid(head, cells[:fitting], columns)
+        while room is not None and len(table) > room and fitting > 1:
+            fitting -= 1
+            table = laid(head, cells[:fitting], columns)
+        lines += [*title, *table, ""]
+        rows += fitting
     return lines, rows, count
-
-
-def _fitting(pair: Pair, columns: int, room: int | None) -> tuple[list[str], int]:
-    """The first rows of a pair that have room, at least one; and how many."""
-    head, rows = ["score", "one", "other", "change", "unit"], [_row(r) for r in pair.rows]
-    if any(r.method for r in pair.rows):
-        head = ["method", *head]
-        rows = [[r.method, *row] for r, row in zip(pair.rows, rows, strict=True)]
-    count = len(rows) if room is None else min(len(rows), max(1, room - 1))
-    lines = laid(head, rows[:count], columns)
-    while room is not None and len(lines) > room and count > 1:
-        count -= 1
-        lines = laid(head, rows[:count], columns)
-    return lines, count
-
-
-def _row(row: Row) -> list[str]:
-    one, other = row.values
-    difference, change = row.differences[1] or 0.0, row.changes[1]
-    sign = "+" if difference > 0 else ""
-    apart = f"{significant(100 * change)} %" if change else text(difference, row.unit)
-    shown = "rounding" if change and abs(change) < _ROUNDING else f"{sign}{apart}"
-    return [row.score, text(one, row.unit), text(other, row.unit), shown, shown_unit(row.unit)]
 
 
 def _parameters(found: SideBySide, columns: int, *, everything: bool) -> list[str]:

@@ -13,12 +13,31 @@ from validate.errors import RecordingError
 def show(as_json: bool) -> None:
     """Print every data set, and where it is here."""
     if as_json:
-        print(json.dumps([_document(s) for s in data_sets()], ensure_ascii=False, indent=2))
+        documents: list[dict[str, Any]] = []
+        for s in data_sets():
+            place = _where(s)
+            files = [
+                {"name": f.name, "address": s.address(f) if f.source else None,
+                 "sha256": f.sha256, "bytes": f.size}
+                for f in s.files
+            ]  # fmt: skip
+            documents.append({
+                "name": s.name, "folder": s.folder, "title": s.title,
+                "repository": s.repository, "commit": s.commit, "licence": s.licence,
+                "citation": s.citation, "made": s.made or None,
+                "here": str(place) if place else None, "files": files,
+            })  # fmt: skip
+        print(json.dumps(documents, ensure_ascii=False, indent=2))
         return
     rows = []
     for s in data_sets():
         size = f"{len(s.files)}, {sum(f.size for f in s.files) / 1e6:.2g} MB"
-        rows.append([s.name, s.title, s.licence, size, _state(s)])
+        place, count = max(_counts(s).items(), key=lambda found: found[1])
+        if not count:
+            here = "no" if s.brought else "no; not downloadable"
+        else:
+            here = relative(place) if count == len(s.files) else f"{count} in {relative(place)}"
+        rows.append([s.name, s.title, s.licence, size, here])
     table("", ["name", "what", "licence", "files", "here"], rows)
     say("\n`validate data get NAME` downloads one; the licence of each applies.")
 
@@ -67,25 +86,3 @@ def _counts(data_set: DataSet) -> dict[Path, int]:
 def _where(data_set: DataSet) -> Path | None:
     whole_in = (p for p, n in _counts(data_set).items() if n == len(data_set.files))
     return next(whole_in, None)
-
-
-def _state(data_set: DataSet) -> str:
-    place, count = max(_counts(data_set).items(), key=lambda found: found[1])
-    if not count:
-        return "no" if data_set.brought else "no; not downloadable"
-    return relative(place) if count == len(data_set.files) else f"{count} in {relative(place)}"
-
-
-def _document(data_set: DataSet) -> dict[str, Any]:
-    here = _where(data_set)
-    files = [
-        {"name": f.name, "address": data_set.address(f) if f.source else None,
-         "sha256": f.sha256, "bytes": f.size}
-        for f in data_set.files
-    ]  # fmt: skip
-    return {
-        "name": data_set.name, "folder": data_set.folder, "title": data_set.title,
-        "repository": data_set.repository, "commit": data_set.commit,
-        "licence": data_set.licence, "citation": data_set.citation,
-        "made": data_set.made or None, "here": str(here) if here else None, "files": files,
-    }  # fmt: skip

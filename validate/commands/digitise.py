@@ -22,7 +22,7 @@ from validate.recording.mcap.read import MCAP
 from validate.recording.mcap.write import write_recording
 from validate.recording.motion_capture.poses import TRANSLATION
 from validate.recording.readers import read_recording
-from validate.recording.types import Markers, Recording
+from validate.recording.types import Markers
 from validate.register.tools.image_plane import KnownTarget
 from validate.register.tools.landmarks import Digitised, Dwell, sd_of_mean
 from validate.units import in_si
@@ -48,7 +48,11 @@ def known_places(file: Path, unit: str | None) -> tuple[KnownTarget, ...]:
             raise UsageError(
                 f"--unit {unit}: {file.name} is a PLUS device set, in millimetres; leave --unit out"
             )
-        return _declared(file)
+        if not (landmarks := read_device_set(file).landmarks):
+            raise UsageError(
+                f"{file.name}: its PhantomDefinition has no landmarks; export them with it"
+            )
+        return tuple(KnownTarget(name, place) for name, place in landmarks.items())
     if MCAP.recognises(file):
         if unit:
             raise UsageError(
@@ -57,7 +61,26 @@ def known_places(file: Path, unit: str | None) -> tuple[KnownTarget, ...]:
         return _landmarks(file, dict(read_recording(file).markers))
     if not unit:
         raise UsageError(f"{file.name}: the table has no unit; give it, as --unit mm")
-    return _table(file, unit)
+    factor = in_si(1.0, unit, "m")
+    if factor is None:
+        raise UsageError(f"--unit {unit}: expected a unit of length, as mm")
+    targets: dict[str, KnownTarget] = {}
+    for row in rows_of(file, ("target", "x", "y", "z")):
+        name = row["target"].strip()
+        if name in targets:
+            raise RecordingError(f"{file.name}: target {name} occurs twice; keep one row")
+        place = factor * np.array([number(file, row, c) for c in "xyz"])
+        along = None  # of a point
+        if (row.get("x2") or "").strip():
+            way = factor * np.array([number(file, row, c) for c in ("x2", "y2", "z2")]) - place
+            if not np.linalg.norm(way):
+                raise RecordingError(
+                    f"{file.name}: wire {row['target']} has two equal ends; give two different "
+                    "points"
+                )
+            along = np.asarray(way / np.linalg.norm(way))
+        targets[name] = KnownTarget(name, place, along)
+    return tuple(targets.values())
 
 
 def _landmarks(file: Path, markers: dict[str, Markers]) -> tuple[KnownTarget, ...]:
@@ -71,41 +94,6 @@ def _landmarks(file: Path, markers: dict[str, Markers]) -> tuple[KnownTarget, ..
     placed = np.isfinite(points.x[0]).all(axis=1)
     pairs = zip(points.names, points.x[0], placed, strict=True)
     return tuple(KnownTarget(name, place) for name, place, seen in pairs if seen)
-
-
-def _declared(file: Path) -> tuple[KnownTarget, ...]:
-    held = read_device_set(file).landmarks
-    if not held:
-        raise UsageError(
-            f"{file.name}: its PhantomDefinition has no landmarks; export them with it"
-        )
-    return tuple(KnownTarget(name, place) for name, place in held.items())
-
-
-def _table(file: Path, unit: str) -> tuple[KnownTarget, ...]:
-    factor = in_si(1.0, unit, "m")
-    if factor is None:
-        raise UsageError(f"--unit {unit}: expected a unit of length, as mm")
-    found: dict[str, KnownTarget] = {}
-    for row in rows_of(file, ("target", "x", "y", "z")):
-        name = row["target"].strip()
-        if name in found:
-            raise RecordingError(f"{file.name}: target {name} occurs twice; keep one row")
-        place = factor * np.array([number(file, row, c) for c in "xyz"])
-        found[name] = KnownTarget(name, place, _along(file, row, factor, place))
-    return tuple(found.values())
-
-
-def _along(file: Path, row: dict[str, str], factor: float, place: Floats) -> Floats | None:
-    """Direction (3,) of a wire; none of a point."""
-    if not (row.get("x2") or "").strip():
-        return None
-    way = factor * np.array([number(file, row, c) for c in ("x2", "y2", "z2")]) - place
-    if not np.linalg.norm(way):
-        raise RecordingError(
-            f"{file.name}: wire {row['target']} has two equal ends; give two different points"
-        )
-    return np.asarray(way / np.linalg.norm(way))
 
 
 def rows_of(file: Path, wanted: tuple[str, ...]) -> list[dict[str, str]]:
@@ -175,10 +163,38 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
             f"the tip of '{how.tool}' never stays within {1e3 * RADIUS:g} mm for {LEAST:g} s: "
             "check --tip"
         )
-    _told_unseen(recording, how, t, standing)
+    # Report poses without the reference, which may be those on a landmark, and places where the
+    # tip was hardly visible: it may have been elsewhere meanwhile
+    poses = len(recording.signals[f"{how.tool}/{TRANSLATION}"].t)
+    if len(t) < poses:
+        complain(
+            f"{poses - len(t)} of {poses} poses of '{how.tool}' are left out: '{how.reference}' "
+            "was not visible then"
+        )
+    step = float(np.median(np.diff(t)))
+    for d in standing:
+        stood, seen = float(np.ptp(d.t)), step * (len(d.t) - 1)
+        if seen < _SEEN * stood:
+            complain(
+                f"from {d.t[0]:.2f} s on, the tip was visible for only {seen:.2g} of "
+                f"{stood:.3g} s: it may have moved in between"
+            )
     parts = tuple(d.touch(_TOUCH, _HOLDS) for d in standing)
     if how.known is None:
-        found = _numbered(how, standing, parts)
+        # Numbers are their names, in the order in which they were touched
+        if how.unit:
+            raise UsageError(
+                f"--unit {how.unit}: it is the unit of --known, which is missing; give --known"
+            )
+        sd = sd_of_mean(parts, standing)
+        places = np.array([d.centre for d in parts])
+        rows = [
+            [str(i + 1), *_shown(x, d)]
+            for i, (x, d) in enumerate(zip(places, standing, strict=True))
+        ]
+        record = {"tip": how.tip, "sd": f"{1e3 * sd:.2g} mm per axis"}
+        numbers = tuple(row[0] for row in rows)
+        found = _Touched(numbers, places, sd, ("landmark", *_COLUMNS), rows, record)
     else:
         found = _named(how, (t, x), standing, parts, known_places(how.known, how.unit))
     table(f"{len(standing)} places where the tip stood still", found.columns, found.rows)
@@ -200,27 +216,6 @@ def digitise(file: Path, out: Path, how: HowDigitised) -> None:
     written(done, out)
 
 
-def _told_unseen(
-    recording: Recording, how: HowDigitised, t: Floats, standing: tuple[Dwell, ...]
-) -> None:
-    """Poses without the reference, which may be those on a landmark, and places where the tip was
-    hardly seen: it may have been elsewhere meanwhile."""
-    poses = len(recording.signals[f"{how.tool}/{TRANSLATION}"].t)
-    if len(t) < poses:
-        complain(
-            f"{poses - len(t)} of {poses} poses of '{how.tool}' are left out: '{how.reference}' "
-            "was not visible then"
-        )
-    step = float(np.median(np.diff(t)))
-    for d in standing:
-        stood, seen = float(np.ptp(d.t)), step * (len(d.t) - 1)
-        if seen < _SEEN * stood:
-            complain(
-                f"from {d.t[0]:.2f} s on, the tip was visible for only {seen:.2g} of "
-                f"{stood:.3g} s: it may have moved in between"
-            )
-
-
 @dataclass(frozen=True)
 class _Touched:
     """Names (k,) and places (k, 3) m of landmarks, sd m per axis; what is told and kept of them."""
@@ -231,22 +226,6 @@ class _Touched:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     record: Mapping[str, str]
-
-
-def _numbered(how: HowDigitised, standing: tuple[Dwell, ...], parts: tuple[Dwell, ...]) -> _Touched:
-    """By numbers, in the order in which they were touched."""
-    if how.unit:
-        raise UsageError(
-            f"--unit {how.unit}: it is the unit of --known, which is missing; give --known"
-        )
-    sd = sd_of_mean(parts, standing)
-    places = np.array([d.centre for d in parts])
-    rows = [
-        [str(i + 1), *_shown(x, d)] for i, (x, d) in enumerate(zip(places, standing, strict=True))
-    ]
-    record = {"tip": how.tip, "sd": f"{1e3 * sd:.2g} mm per axis"}
-    names = tuple(row[0] for row in rows)
-    return _Touched(names, places, sd, ("landmark", *_COLUMNS), rows, record)
 
 
 def _named(
@@ -268,7 +247,18 @@ def _named(
         for name, x, d, a, b in zip(found.touched, found.places, whole, off, left, strict=True)
     ]
     columns = ("landmark", *_COLUMNS, "residual, mm", "left out, mm")
-    return _Touched(found.touched, found.places, found.sd, columns, rows, _record(how, found))
+    untouched = [name for name in names if name not in found.touched]
+    matrix = " ".join(f"{v:.9g}" for v in found.pose.matrix.ravel())
+    record = {
+        "tip": how.tip,
+        "sd": f"{1e3 * found.sd:.2g} mm per axis",
+        "fitted": f"rms {_distance(found.residuals)} of {len(found.touched)} landmarks",
+        "predicted": f"rms {_distance(found.left_out)}, each landmark from the others",
+        "not touched": ", ".join(untouched) or "none",
+        "places that are no landmark": str(len(parts) - len(found.touched)),
+        "pose": f"{matrix} (from the landmarks' frame to the tip's frame, m, row by row)",
+    }
+    return _Touched(found.touched, found.places, found.sd, columns, rows, record)
 
 
 def _shown(x: Floats, d: Dwell) -> list[str]:
@@ -282,18 +272,3 @@ def _shown(x: Floats, d: Dwell) -> list[str]:
 
 def _distance(off: Floats) -> str:
     return f"{1e3 * rms(np.linalg.norm(off, axis=1)):.3g} mm"
-
-
-def _record(how: HowDigitised, found: Digitised) -> dict[str, str]:
-    untouched = [name for name in found.names if name not in found.touched]
-    none = len(found.parts) - len(found.touched)
-    matrix = " ".join(f"{v:.9g}" for v in found.pose.matrix.ravel())
-    return {
-        "tip": how.tip,
-        "sd": f"{1e3 * found.sd:.2g} mm per axis",
-        "fitted": f"rms {_distance(found.residuals)} of {len(found.touched)} landmarks",
-        "predicted": f"rms {_distance(found.left_out)}, each landmark from the others",
-        "not touched": ", ".join(untouched) or "none",
-        "places that are no landmark": str(none),
-        "pose": f"{matrix} (from the landmarks' frame to the tip's frame, m, row by row)",
-    }

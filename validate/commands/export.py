@@ -30,7 +30,7 @@ def export(
     Raises `UsageError` where none is requested, or no such run is stored.
     """
     run = stored_folder(name)
-    makers = ((junit_file, _junit), (latex_file, checks_in_latex))
+    makers = ((junit_file, lambda t: junit(content_of(t))), (latex_file, checks_in_latex))
     wanted = [(file, make) for file, make in makers if file is not None]
     if not wanted and figures is None:
         raise UsageError(
@@ -84,27 +84,19 @@ def _figures(run: Path, folder: Path) -> None:
                 written.append(folder / f"{file.stem}{suffix}")
                 figure_of_file(file).savefig(written[-1])
     names = {file.name for file in written}
-    gone = _exported(folder) - names
+    # Files that an earlier export wrote are removed
+    try:
+        listed = json_value((folder / _LIST).read_bytes())["files"]
+        earlier = {str(name) for name in listed if Path(str(name)).name == name}
+    except (OSError, ValueError, KeyError, TypeError):
+        earlier = set()
+    gone = {name for name in earlier if (folder / name).is_file()} - names
     for name in gone:
         (folder / name).unlink()
     document = {"run": str(run), "created": table.head["created"], "files": sorted(names)}
     write_whole(folder / _LIST, json.dumps(document, indent=1) + "\n")
     replaced = f", {len(gone)} of an earlier export removed" if gone else ""
     say(f"{relative(folder)}: {len(names)} files{replaced}", indent="  ")
-
-
-def _exported(folder: Path) -> set[str]:
-    """The names of files in a folder that an earlier export wrote."""
-    try:
-        found = json_value((folder / _LIST).read_bytes())["files"]
-        names = {str(name) for name in found if Path(str(name)).name == name}
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
-    return {name for name in names if (folder / name).is_file()}
-
-
-def _junit(table: LongTable) -> str:
-    return junit(content_of(table))
 
 
 def checks_in_latex(table: LongTable) -> str:

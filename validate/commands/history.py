@@ -12,7 +12,6 @@ from validate.errors import UsageError
 from validate.parameters import nearest_names
 from validate.report.stored.run_changes import (
     PastCheck,
-    PastRun,
     Since,
     history,
     since,
@@ -53,33 +52,26 @@ def show(name: str, named: tuple[Path, ...], out: Path | None, as_json: bool) ->
         when = run.created[:16].replace("T", " ")
         gone = ", replaced" if "replaced" in run.line else ""
         say(f"\n{(i + 1)}. {when} UTC, {run.folder}{gone}: {run.verdict}", "bold", "   ")
-        say(f"   differs: {_differs(run)}; commit {run.commit}", indent="     ")
-        say(f"   figures: {_figures(run)}", indent="     ")
+        words = run.folder.rpartition("-")[0].split("+")  # a run with fewer methods is called so
+        differs = ["quick"] if run.line.get("quick") else []
+        differs += [f"methods {', '.join(run.methods)}"] if "methods" in words else []
+        differs += [
+            f"{c['path']} {with_unit(c['default'], '1')} -> {with_unit(c['value'], c['unit'])}"
+            for c in run.line.get("changed", [])
+        ]
+        say(f"   differs: {', '.join(differs) or 'nothing'}; commit {run.commit}", indent="     ")
+        # The identified value that comes first, and the checks nearest to their limits
+        figures = [
+            f"{s['name']} {shown(s['value'], s['unit'])}"
+            for s in run.line.get("identified", [])[:1]
+            if s["value"] is not None
+        ]
+        judged = [c for c in run.checks if c.value is not None]
+        judged.sort(key=lambda c: -abs(c.value or 0) / (c.limit or math.inf))
+        figures += map(_figure, judged[:_FIGURES])
+        say(f"   figures: {'; '.join(figures) or 'no check has a number'}", indent="     ")
         if i:
             _since(i, changes[i - 1])
-
-
-def _differs(run: PastRun) -> str:
-    changed = [
-        f"{c['path']} {with_unit(c['default'], '1')} -> {with_unit(c['value'], c['unit'])}"
-        for c in run.line.get("changed", [])
-    ]
-    words = run.folder.rpartition("-")[0].split("+")  # a run with fewer methods is called so
-    some = [f"methods {', '.join(run.methods)}"] if "methods" in words else []
-    quick = ["quick"] if run.line.get("quick") else []
-    return ", ".join([*quick, *some, *changed]) or "nothing"
-
-
-def _figures(run: PastRun) -> str:
-    """The identified value that comes first, and the checks nearest to their limits."""
-    found = [
-        f"{s['name']} {shown(s['value'], s['unit'])}"
-        for s in run.line.get("identified", [])[:1]
-        if s["value"] is not None
-    ]
-    judged = [c for c in run.checks if c.value is not None]
-    judged.sort(key=lambda c: -abs(c.value or 0) / (c.limit or math.inf))
-    return "; ".join([*found, *map(_figure, judged[:_FIGURES])]) or "no check has a number"
 
 
 def _figure(c: PastCheck) -> str:

@@ -1,7 +1,8 @@
 """`validate inspect`: content of a recording and summary of its motion."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -23,23 +24,16 @@ def inspect(
     """Print what a file of any format holds; return 1 where it has a defect, else 0."""
     options = pairs(mapping, "--map")
     found = inspect_file(file, kind, options)
-    motion = _motion(file, kind, options)
+    motion: tuple[str, ...] = ()
+    with suppress(ValidateError):  # not readable as a recording: `found` says so
+        reader = named(kind) if kind else recognised(file)
+        motion = motion_lines(reader.read(file, options))
     if as_json:
         document = {**found.to_dict(), "motion": motion}
         print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
     else:
         show(_passages(found, motion, detail), detail)
     return FAILED if found.defects else OK
-
-
-def _motion(file: Path, kind: str | None, options: Mapping[str, str]) -> tuple[str, ...]:
-    """Lines on what moves; none of a file that cannot be read as a recording, as its inspection
-    says."""
-    try:
-        reader = named(kind) if kind else recognised(file)
-        return motion_lines(reader.read(file, options))
-    except ValidateError:
-        return ()
 
 
 def messages(file: Path, topic: str, most: int, as_json: bool) -> None:
@@ -63,18 +57,32 @@ def _passages(found: Inspection, motion: Sequence[str], detail: Detail) -> list[
     counted = f"{defects or 'no'} defect{'' if defects == 1 else 's'}"
     names = f"{len(streams)} stream{'' if len(streams) == 1 else 's'}"
     head = ["", "kind", "n", "duration / s", "rate / Hz", "gaps", "unit", "frame"]
-    mcap = found.chunks or found.read_as == "mcap"
     facts = [*found.clock_offsets, *(found.facts if found.read_as == "mcap" else ())]
-    file = (_head(found) if mcap else _other(found)).strip().splitlines()
-
+    source = found.source
+    if found.chunks or found.read_as == "mcap":
+        start = [t.first_ns for t in found.topics if t.first_ns is not None]
+        when = datetime.fromtimestamp(min(start) / 1e9, UTC).isoformat() if start else "-"
+        file = (
+            f"{found.messages} messages from {when}; {found.attachments} attachments; metadata: "
+            f"{', '.join(found.metadata) or 'none'}\n"
+            f"{source.bytes} bytes in {found.chunks} chunks ({', '.join(found.compressions)}), "
+            f"library '{found.library}', profile '{found.profile}'\n"
+            f"integrity: {source.integrity}; sha256 {source.sha256}"
+        )
+    else:
+        size, sums = "", ""
+        if source.sha256:
+            size, sums = f"{source.bytes} bytes; ", f"; sha256 {source.sha256}"
+        told = "".join(f"{line}\n" for line in found.facts)
+        file = f"read as {found.read_as}\n{told}{size}integrity: {source.integrity}{sums}"
     return [
-        sentences([f"{found.source.path}: {names}, {counted}."], None),
+        sentences([f"{source.path}: {names}, {counted}."], None),
         sentences((f"defect: {d}" for d in found.defects), keep=4, most=8),
         Passage("Streams", rows(head, [_row(t)[:-1] for t in streams]), 4, 12),
         sentences(unread, keep=2),
         sentences(motion, keep=3),
         sentences(facts, keep=1),
-        sentences(file, keep=3),
+        sentences(file.strip().splitlines(), keep=3),
         Passage("Schemas", rows(["", "schema (encoding)"], [[t.name, _row(t)[-1]] for t in streams])
               if full else ()),
     ]  # fmt: skip
@@ -91,24 +99,3 @@ def _row(topic: Topic) -> list[str]:
         topic.name, topic.kind, str(topic.count), duration, rate, gaps, topic.unit or "-",
         topic.frame or "-", schema,
     ]  # fmt: skip
-
-
-def _other(found: Inspection) -> str:
-    source = found.source
-    told = "".join(f"{line}\n" for line in found.facts)
-    size, sums = (
-        (f"{source.bytes} bytes; ", f"; sha256 {source.sha256}") if source.sha256 else ("", "")
-    )
-    return f"\nread as {found.read_as}\n{told}{size}integrity: {source.integrity}{sums}"
-
-
-def _head(found: Inspection) -> str:
-    start = [t.first_ns for t in found.topics if t.first_ns is not None]
-    when = datetime.fromtimestamp(min(start) / 1e9, UTC).isoformat() if start else "-"
-    return (
-        f"\n{found.messages} messages from {when}; {found.attachments} attachments; metadata: "
-        f"{', '.join(found.metadata) or 'none'}\n"
-        f"{found.source.bytes} bytes in {found.chunks} chunks ({', '.join(found.compressions)}), "
-        f"library '{found.library}', profile '{found.profile}'\n"
-        f"integrity: {found.source.integrity}; sha256 {found.source.sha256}"
-    )

@@ -25,7 +25,7 @@ def show(name: str, named: tuple[Path, ...], as_json: bool, detail: Detail = "sc
     """Print parameters, methods and requirements of an experiment; "full" prints all of them."""
     experiment = find(name, Path.cwd(), named)
     if as_json:
-        document = _summary(experiment) | _details(experiment)
+        document = _document(experiment)
         print(json.dumps(document, ensure_ascii=False, indent=2, allow_nan=False))
     elif detail == "screen":
         cells = [[p.path, cut(_default(p), _DEFAULT), p.doc] for p in _by_weight(experiment)]
@@ -89,12 +89,11 @@ def parameters_of(experiment: Experiment) -> tuple[Parameter, ...]:
     return (*own, *map(told, describe(experiment.methods, "methods.")))
 
 
-def _summary(experiment: Experiment) -> dict[str, Any]:
-    return {"name": experiment.name, "title": experiment.title, "source": experiment.source}
-
-
-def _details(experiment: Experiment) -> dict[str, Any]:
+def _document(experiment: Experiment) -> dict[str, Any]:
     return {
+        "name": experiment.name,
+        "title": experiment.title,
+        "source": experiment.source,
         "parameters": [
             {"path": p.path, "type": p.type, "unit": p.unit, "default": p.default, "doc": p.doc}
             for p in parameters_of(experiment)

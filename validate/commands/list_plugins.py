@@ -23,7 +23,16 @@ _HOMES: Mapping[str, tuple[str, ...]] = {
 def show(as_json: bool) -> None:
     """Print every installed plug-in: kind, name, package, version and whether it is used."""
     kinds = sorted({plug_in.kind for plug_in in plug_ins()})
-    states = {plug_in: why for kind in kinds for plug_in, why in _states(kind)}
+    states: dict[PlugIn, str] = {}  # why each is left out; "" for one that is used
+    for kind in kinds:
+        if kind == "experiments":
+            for plug_in in plug_ins(kind):
+                there = folder_of_experiments(plug_in)
+                states[plug_in] = "" if there else "its folder is absent"
+        else:
+            module, *names = _HOMES[kind]
+            home = import_module(f"validate.{module}")
+            states |= {p: why for name in names for p, why in getattr(home, name).states}
     if as_json:
         listed = [{**asdict(plug_in), "left_out": why} for plug_in, why in states.items()]
         print(json.dumps(listed, ensure_ascii=False, indent=2))
@@ -34,15 +43,3 @@ def show(as_json: bool) -> None:
             print(line)
     else:
         print("no plug-ins are installed; docs/developers/plugins.md shows how to write one")
-
-
-def _states(kind: str) -> tuple[tuple[PlugIn, str], ...]:
-    """Each plug-in of a kind and why it is left out; "" for one that is used."""
-    if kind == "experiments":
-        return tuple(
-            (plug_in, "" if folder_of_experiments(plug_in) else "its folder is absent")
-            for plug_in in plug_ins(kind)
-        )
-    module, *names = _HOMES[kind]
-    home = import_module(f"validate.{module}")
-    return tuple(state for name in names for state in getattr(home, name).states)

@@ -77,7 +77,26 @@ def run(
     if as_json:
         print(json.dumps(said, indent=1, ensure_ascii=False))
     else:
-        _told(done, said)
+        share = 100 * done.missed / done.ticks if done.ticks else 0.0
+        say(f"{said['experiment']}, {said['method']}: {done.ticks} ticks at {done.rate:.4g} Hz, "
+            f"{done.missed} missed ({share:.3g} %), {said['answered']} answered")  # fmt: skip
+        rows = [[k, str(int(v["n"])), *(f"{1e6 * v[q]:.0f}" for q in v if q != "n")]
+                for k, v in said["times"].items()]  # fmt: skip
+        heads = ["microseconds", "n", *(f"{100 * q:g} %" for q in TickTimes.shares), "longest"]
+        table("Times of a tick", heads, rows)
+        if jumps := said["findings"].get("resynchronised"):
+            complain(
+                f"resynchronised {jumps} times, each after {RESYNC} late or out-of-order packets "
+                "in a row: the clock jumped, or the device restarted"
+            )
+        if said["findings"]:
+            table(
+                "Found", ["what", "count"], [[k, str(v)] for k, v in said["findings"].items() if v]
+            )
+        if said["recording"]:
+            say(f"\nwritten: {relative(file)}; replay it with `{said['replay']}`")
+        else:
+            say("\nno packet was answered, so there is no recording")
     return 0
 
 
@@ -88,25 +107,3 @@ def _lived(made: Prepared, seconds: float | None, listen: int | None) -> LiveRun
         host, port = source.address
         complain(f"listens on {host} port {port} (UDP), see docs/how-to/live.md; Ctrl-C ends it")
         return live(made.stepper, source, seconds)
-
-
-def _told(done: LiveRun, said: dict[str, Any]) -> None:
-    share = 100 * done.missed / done.ticks if done.ticks else 0.0
-    say(f"{said['experiment']}, {said['method']}: {done.ticks} ticks at {done.rate:.4g} Hz, "
-        f"{done.missed} missed ({share:.3g} %), {said['answered']} answered")  # fmt: skip
-    rows = [[k, str(int(v["n"])), *(f"{1e6 * v[q]:.0f}" for q in v if q != "n")]
-            for k, v in said["times"].items()]  # fmt: skip
-    heads = ["microseconds", "n", *(f"{100 * q:g} %" for q in TickTimes.shares), "longest"]
-    table("Times of a tick", heads, rows)
-    if jumps := said["findings"].get("resynchronised"):
-        complain(
-            f"resynchronised {jumps} times, each after {RESYNC} late or out-of-order packets "
-            "in a row: the clock jumped, or the device restarted"
-        )
-    if said["findings"]:
-        table("Found", ["what", "count"], [[k, str(v)] for k, v in said["findings"].items() if v])
-    if said["recording"]:
-        file = relative(Path(said["recording"]))
-        say(f"\nwritten: {file}; replay it with `{said['replay']}`")
-    else:
-        say("\nno packet was answered, so there is no recording")

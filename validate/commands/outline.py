@@ -15,14 +15,13 @@ from validate.places import try_file
 from validate.recording.mcap.write import write_recording
 from validate.recording.outlines.outline import (
     EXPERTS,
-    FollowedOutline,
     Hint,
     RivalRegion,
     followed,
 )
 from validate.recording.outlines.third_party_outlines import foreign_outlines
 from validate.recording.readers import read_recording
-from validate.recording.types import Contours, Frames, Recording
+from validate.recording.types import Contours, Frames
 from validate.report.charts.style import png
 from validate.report.scenes.outline_images import PlaceSaid, outlines_over
 from validate.units import in_si, split
@@ -36,9 +35,21 @@ def outline(
 ) -> None:
     """Add the outlines of the images `topic` to the recording in `file` as the stream `name`."""
     recording = read_recording(file)
-    out = out or _same(file, recording)
+    if out is None:
+        if recording.unread:  # not a stream here: it would be lost in the same file
+            raise UsageError(
+                f"{file.name} has {len(recording.unread)} topics that are not read and would be "
+                "lost: write to another file, -o OUT.mcap"
+            )
+        out = file
     try_file(out)
-    images = topic or _only(recording)
+    if not topic and len(recording.frames) != 1:
+        raise UsageError(
+            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
+            if recording.frames
+            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
+        )
+    images = topic or next(iter(recording.frames))
     frames = recording.frame(images)
     # Outlines that this command made may be made again
     if name in recording.streams and f"found/{name}" not in recording.metadata:
@@ -53,31 +64,21 @@ def outline(
     write_recording(replace(recording, contours=streams, metadata=records), out)
     for key, text in told.items():
         say(f"{key}: {text}", indent="  ")
-    _pictured(frames, contours, out.with_name(f"{out.stem}-{safe_name(name)}.png"), marks)
+    # Some images, evenly, with their outlines; in the first one the given place, and what else
+    # might be meant
+    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
+    shown = [(f"outline {i}", float(contours.t[i])) for i in at]
+    _, picture = outlines_over(frames, contours, shown, "evenly spaced in time", "", marks=marks)
+    place = out.with_name(f"{out.stem}-{safe_name(name)}.png")
+    try:
+        place.write_bytes(png(picture))
+    except OSError as error:
+        raise RecordingError(f"{place}: cannot be written ({error.strerror})") from error
+    say(f"{place}: {len(at)} images with their outlines: check them", indent="  ")
     say(
         f"{out}: {name} ({len(contours.t)} outlines); {out.stat().st_size / 1e3:.0f} kB",
         indent="  ",
     )
-
-
-def _same(file: Path, recording: Recording) -> Path:
-    """The recording itself, unless that would lose what is no stream here."""
-    if recording.unread:
-        raise UsageError(
-            f"{file.name} has {len(recording.unread)} topics that are not read and would be "
-            "lost: write to another file, -o OUT.mcap"
-        )
-    return file
-
-
-def _only(recording: Recording) -> str:
-    if len(recording.frames) != 1:
-        raise UsageError(
-            f"{recording.name}: images {sorted(recording.frames)}; choose one: --topic NAME"
-            if recording.frames
-            else f"{recording.name}: no images; it has {sorted(recording.streams)}"
-        )
-    return next(iter(recording.frames))
 
 
 def _found(
@@ -86,10 +87,17 @@ def _found(
     for option in ("sd", "unit", "label"):
         if given[option]:
             raise UsageError(f"--{option} is for third-party outlines; give it with --from FILE")
-    hint = Hint(_place(given["centre"], frames), _length("--radius", given["radius"], frames),
-                given["shape"], given["bright"])  # fmt: skip
-    with progress("outlines") as told:
-        found = followed(frames, hint, images, told, given["confidence"])
+    # From the first pixel's centre, m
+    centre: Any = None
+    if (text := given["centre"]) is not None:
+        parts = text.split(",")
+        if len(parts) != 2:
+            raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
+        centre = np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
+    radius = _length("--radius", given["radius"], frames)
+    hint = Hint(centre, radius, given["shape"], given["bright"])
+    with progress("outlines") as report:
+        found = followed(frames, hint, images, report, given["confidence"])
     if found.rivals:
         named = "; ".join(f"{r.words} ({r.share:.2f} of the contrast)" for r in found.rivals)
         complain(
@@ -102,17 +110,12 @@ def _found(
         i, why = next(iter(found.without.items()))
         complain(f"{len(found.without)} images have no outline and are left out, first {i}: {why}")
     # What was said, a radius alone about the outline, and the other regions
-    first = found.contours.outlines[0].mean(axis=0)
-    centre = first if hint.centre is None else hint.centre
-    marks = [PlaceSaid("as given", centre, hint.radius, True)]
-    if hint.centre is None and hint.radius is None:
-        marks = []
+    marks = []
+    if centre is not None or radius is not None:
+        place = found.contours.outlines[0].mean(axis=0) if centre is None else centre
+        marks = [PlaceSaid("as given", place, radius, True)]
     others = (*found.rivals, *found.beside)
     marks += [PlaceSaid("another region", r.centre, r.radius) for r in others]
-    return found.contours, _told(found, hint), tuple(marks)
-
-
-def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
     sd, c = found.contours.sd, found.confidence
     assert found.contours.each is not None
     own = 1e3 * found.contours.each[:, 0]
@@ -129,7 +132,7 @@ def _told(found: FollowedOutline, hint: Hint) -> dict[str, str]:
         told["near the given centre"] = _named(found.beside)
     if found.without:
         told["left out"] = ", ".join(map(str, found.without))
-    return told
+    return found.contours, told, tuple(marks)
 
 
 def _named(regions: tuple[RivalRegion, ...]) -> str:
@@ -155,16 +158,6 @@ def _drawn(
     return contours, {**told, "label": label} if label else told
 
 
-def _place(text: str | None, frames: Frames) -> Any:
-    """X,Y in pixels or with units, from the first pixel's centre, m."""
-    if text is None:
-        return None
-    parts = text.split(",")
-    if len(parts) != 2:
-        raise UsageError(f"--centre {text}: expected X,Y as 120px,80px or 12mm,20mm")
-    return np.array([_length("--centre", p, frames, axis=i) for i, p in enumerate(parts)])
-
-
 def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> float | None:
     if text is None:
         return None
@@ -174,18 +167,3 @@ def _length(option: str, text: str | None, frames: Frames, axis: int = 0) -> flo
     if value is None or not np.isfinite(value) or (value <= 0 and option != "--centre"):
         raise UsageError(f"{option} {text}: expected a length with its unit, as 8mm or 80px")
     return float(value)
-
-
-def _pictured(frames: Frames, contours: Contours, file: Path, marks: tuple[PlaceSaid, ...]) -> None:
-    """Up to six images, evenly, with their outlines; in the first one what was said of the place
-    and what else might be meant."""
-    at = np.unique(np.linspace(0, len(contours.t) - 1, _SHOWN).round().astype(int))
-    instants = [(f"outline {i}", float(contours.t[i])) for i in at]
-    try:
-        _, picture = outlines_over(
-            frames, contours, instants, "evenly spaced in time", "", marks=marks
-        )
-        file.write_bytes(png(picture))
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be written ({error.strerror})") from error
-    say(f"{file}: {len(at)} images with their outlines: check them", indent="  ")

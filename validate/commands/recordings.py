@@ -47,8 +47,22 @@ def import_files(
     are repeats of one test of a testing machine."""
     try_file(out)
     said = pairs(mapping, "--map") | {k: str(v) for k, v in given.items() if v is not None}
-    found = _logs(files, kind)
-    logs = [log for file in found for log in _read(file, kind, said)]
+    # The files, or of a folder that is no format of its own those in it, in their order
+    found = list(files)
+    if len(files) == 1 and files[0].is_dir() and not kind:
+        known = known_unread(files[0]) or any(recognises(r, files[0]) for r in READERS)
+        found = found if known else [member(file) for file in members(files[0])] or found
+    logs: list[Recording] = []
+    for file in found:
+        # A file as its reader makes it, all its specimens where that is said, and what decided
+        reader = named(kind) if kind else recognised(file)
+        every = said.get("specimen") == ALL
+        read = every_specimen(reader, file, said) if every else [reader.read(file, said)]
+        why = "as given by --as" if kind else f"because {reader.sign}"
+        say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
+        for recording in read:
+            _tell(recording)
+        logs += read
     if len(logs) == 1 and specimens is None:
         recording = logs[0]
     else:
@@ -60,27 +74,6 @@ def import_files(
     for line in _besides(recording):
         complain(line)
     ask_back(recording)
-
-
-def _logs(files: tuple[Path, ...], kind: str | None) -> list[Path]:
-    """The files, and of a folder that is no format of its own those in it, in their order."""
-    if len(files) > 1 or not files[0].is_dir() or kind:
-        return list(files)
-    if known_unread(files[0]) or any(recognises(reader, files[0]) for reader in READERS):
-        return list(files)
-    return [member(file) for file in members(files[0])] or list(files)
-
-
-def _read(file: Path, kind: str | None, said: Mapping[str, str]) -> list[Recording]:
-    """A file as its reader makes it, all its specimens where that is said, and what decided."""
-    reader = named(kind) if kind else recognised(file)
-    every = said.get("specimen") == ALL
-    found = every_specimen(reader, file, said) if every else [reader.read(file, said)]
-    why = "as given by --as" if kind else f"because {reader.sign}"
-    say(f"{file.name}: read as {reader.name} ({reader.doc}), {why}", indent="  ")
-    for recording in found:
-        _tell(recording)
-    return found
 
 
 def _tell(recording: Recording) -> None:
@@ -128,7 +121,12 @@ def merge_files(files: tuple[Path, ...], out: Path, shifts: tuple[str, ...]) -> 
     merged = merge([read_recording(f) for f in files], out.stem)
     require_chain(merged)
     for topic, text in pairs(shifts, "--shift").items():
-        merged = declared_offset(merged, topic, *_seconds(topic, text)).shift(merged, topic)
+        seconds, _, sd = text.partition(":")
+        try:
+            by = float(seconds), float(sd or "nan")
+        except ValueError:
+            raise UsageError(f"--shift {topic}={text}: expected SECONDS or SECONDS:SD") from None
+        merged = declared_offset(merged, topic, *by).shift(merged, topic)
     write_recording(merged, out)
     written(merged, out)
     if not shifts and len(files) > 1:
@@ -143,14 +141,6 @@ def ask_back(recording: Recording) -> None:
     """A line on standard error for every scale of images or outlines that is beyond reason."""
     for line in odd_scales(recording):
         complain(line)
-
-
-def _seconds(topic: str, text: str) -> tuple[float, float]:
-    seconds, _, sd = text.partition(":")
-    try:
-        return float(seconds), float(sd or "nan")
-    except ValueError:
-        raise UsageError(f"--shift {topic}={text}: expected SECONDS or SECONDS:SD") from None
 
 
 def written(recording: Recording, out: Path) -> None:

@@ -51,15 +51,37 @@ def show_run(
     # What the recording is and what was chosen on it, where that limits what the verdict says
     texts = [] if result.kind == "measured" else [f"Recording: {KINDS[result.kind]}."]
     texts += [f"{m.name}: {m.chosen}." for m in result.methods if m.checks and m.chosen]
+    moved = [f"the verdict changed: {m.words}" for m in result.moved] if result.expected else []
+    findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
+    warnings = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
+    # Name, value with half of its 95 % interval, and the method, a line each
+    identified = []
+    for v in result.identified_values:
+        low, high = v.interval
+        value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
+        identified.append([v.name, f"{value} ± {half}", f"by {v.by}"])
+    # Why methods did not finish; one line for those with the same reason
+    ends: dict[str, list[str]] = {}
+    for method in result.methods:
+        if ended := next((r.outcome for r in method.runs if not r.finished), None):
+            why = f"{ended.state} at step {ended.step}: {ended.why}"
+            ends.setdefault(why, []).append(method.name)
+    unfinished = [f"{', '.join(names)}: {why}" for why, names in ends.items()]
+    # The likely causes of the first difference, with what would decide each
+    cells: list[list[str]] = []
+    if found := next((e for e in result.exhibits if e.anchor == "likely-causes"), None):
+        every = found.tables[0].rows
+        first = [r for r in every if r[:2] == every[0][:2]]
+        cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
     show(
         (
             sentences([headline(result)], None),
             sentences(texts, None),
-            sentences(_warnings(result), keep=2, most=4),
+            sentences((f"warning: {text}" for text in warnings), keep=2, most=4),
             *([] if verbose else check_passages(_checks(result))),
-            sentences(_unfinished(result), keep=2, most=4),
-            Passage("Identified, with 95 % intervals", _identified(result), 1, 4),
-            Passage(causes, () if verbose else _causes(result), 2, 4),
+            sentences(unfinished, keep=2, most=4),
+            Passage("Identified, with 95 % intervals", rows([""] * 3, identified), 1, 4),
+            Passage(causes, () if verbose else rows([""] * 3, cells, soft=2), 2, 4),
             *([ranking] if ranking else []),
             figures_line([figure_members(p) for p in result.published], name),
             Passage("Next", () if verbose else tuple(_next(result, name))[:3]),
@@ -75,8 +97,8 @@ def show_run(
         for method in result.methods:
             for words in dict.fromkeys(w for r in method.runs for w in r.said):
                 say(f"{method.name}: {words}", indent="  ")
-        for value in result.identified_values:
-            say(f"{sentence(value)}.", indent="  ")
+        for v in result.identified_values:
+            say(f"{sentence(v)}.", indent="  ")
         say(f"\n{result.sentence}")
         say(end)
 
@@ -115,46 +137,7 @@ def _checks(result: Result) -> list[Json]:
     return [{"method": m.name, **check_members(c)} for m in result.methods for c in m.checks]
 
 
-def _warnings(result: Result) -> list[str]:
-    moved = [f"the verdict changed: {m.words}" for m in result.moved] if result.expected else []
-    findings = [f"{v.name} by {v.by}: {v.finding}" for v in result.identified_values if v.finding]
-    texts = dict.fromkeys((*moved, *result.warnings, *result.locking, *findings))
-    return [f"warning: {text}" for text in texts]
-
-
 # --- methods --------------------------------------------------------------------------------------
-
-
-def _unfinished(result: Result) -> list[str]:
-    """Why methods did not finish; one line for those with the same reason."""
-    ends: dict[str, list[str]] = {}
-    for method in result.methods:
-        if ended := next((r.outcome for r in method.runs if not r.finished), None):
-            ends.setdefault(f"{ended.state} at step {ended.step}: {ended.why}", []).append(
-                method.name
-            )
-    return [f"{', '.join(names)}: {why}" for why, names in ends.items()]
-
-
-def _causes(result: Result) -> tuple[str, ...]:
-    """The likely causes of the first difference, with what would decide each."""
-    found = next((e for e in result.exhibits if e.anchor == "likely-causes"), None)
-    if found is None:
-        return ()
-    every = found.tables[0].rows
-    first = [r for r in every if r[:2] == every[0][:2]]
-    cells = [[f"{r[2]}. {r[3]}", f"{float(str(r[4])):.0f} %", str(r[6])] for r in first]
-    return rows([""] * 3, cells, soft=2)
-
-
-def _identified(result: Result) -> tuple[str, ...]:
-    """Name, value with half of its 95 % interval, and the method, a line each."""
-    cells = []
-    for v in result.identified_values:
-        low, high = v.interval
-        value, half = with_unit(v.value, v.unit, 4), with_unit((high - low) / 2, v.unit, 2)
-        cells.append([v.name, f"{value} ± {half}", f"by {v.by}"])
-    return rows([""] * 3, cells)
 
 
 def _ranking(result: Result) -> Passage | None:

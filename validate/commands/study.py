@@ -20,7 +20,7 @@ from validate.pipeline.experiment.experiment import Experiment
 from validate.pipeline.experiment.find import find
 from validate.report.stored.folder import MARK
 from validate.study.choose.exhibits import words
-from validate.study.choose.study import Choice, error_of
+from validate.study.choose.study import error_of
 from validate.study.coverage import page as coverage_page
 from validate.study.coverage.page import HEAD, interval, percent
 from validate.study.filters import page as filter_page
@@ -29,10 +29,8 @@ from validate.study.filters.ranking import Ranking
 from validate.study.filters.ranking import sentence as ending_words
 from validate.study.filters.study import FilterStudy
 from validate.study.stability import page as stability_page
-from validate.study.stability.study import Stability
 from validate.study.sweep import named
 from validate.study.tradeoff import page as trade_page
-from validate.study.tradeoff.study import Trade
 
 _SETTINGS = 30  # characters of the settings of a place
 _RANKINGS = 2  # conditions whose rankings a screen shows
@@ -88,7 +86,31 @@ def filters(
             cells = [[_text(v) for v in row] for row in made.rows]
             under = f" with {named(ranking.condition)}" if ranking.condition else ""
             table(f"Ranking by {found.by}{under}, all columns", made.headings, cells)
-    answer(_filter_passages(found, common.detail), found.done, done.page, common.detail)
+    # The best settings first, then the places of each condition
+    passages = [
+        sentences([filter_page.sentence(found)], None),
+        sentences((b.line for b in found.best), None, keep=1, most=4),
+    ]
+    shown = found.rankings[: _RANKINGS if common.detail == "screen" else None]
+    for ranking in shown:
+        under = f" with {named(ranking.condition)}" if ranking.condition else ""
+        passages.append(Passage(f"Ranking by {found.by}{under}", _places(ranking, found), 2, 11))
+        notes: list[str] = []
+        if len(found.plan.seeds) == 1:
+            notes += [] if ranking.blocks is None else [ranking.blocks.words]
+            notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
+        passages.append(sentences(notes, None, keep=1))
+    if left := len(found.rankings) - len(shown):
+        passages.append(Passage("", (f"{left} more conditions: --verbose",)))
+    if found.plan.single_words:
+        passages.append(sentences([found.plan.single_words], None))
+    passages.append(Passage("", ("!: NIS outside its 95 % band; *: on the Pareto front",)))
+    failed = (
+        f"failed: {cell.name} ({named(cell.values)}): {why}"
+        for r in found.rankings for cell, why in r.failed
+    )  # fmt: skip
+    passages.append(sentences(failed, keep=1, most=4))
+    answer(passages, found.done, done.page, common.detail)
     return OK
 
 
@@ -103,8 +125,19 @@ def stability_map(name: str, common: StudyOptions) -> int:
         sentence = read_sealed(page.parent / MARK)["sentence"]
         show([sentences([sentence, f"report: {relative(page)}"], None)], common.detail)
     else:
-        ended = "" if found.endings is None else ending_words(found.endings)
-        answer(_stability_passages(found.map, ended), found.map.done, page, common.detail)
+        quick = "QUICK: fewer points; " if found.map.quick else ""
+        cells = [
+            [p.name, _text(p.value), significant(p.limit), str(p.count),
+             "holds" if p.holds else "FAILS"]
+            for p in sorted(found.map.predictions, key=lambda p: p.holds)
+        ]  # fmt: skip
+        head = ["prediction", "worst / 1", "limit / 1", "count", "verdict"]
+        passages = [
+            sentences([f"{quick}{stability_page.sentence(found.map)}"], None),
+            sentences([] if found.endings is None else [ending_words(found.endings)], None),
+            Passage("Predictions against measured spectral radii", rows(head, cells), 3),
+        ]
+        answer(passages, found.map.done, page, common.detail)
     return OK if found.passed else FAILED
 
 
@@ -112,8 +145,22 @@ def tradeoff(name: str, common: StudyOptions, simulators: tuple[str, ...] = ()) 
     """Measure error against time; 0."""
     with noted():
         done = studies.tradeoff(common.experiment(name), common.settings, simulators)
-    if not printed(done.page, common):
-        answer(_trade_passages(done.found), done.found.done, done.page, common.detail)
+    if printed(done.page, common):
+        return OK
+    found = done.found
+    passages = [sentences([trade_page.sentence(found)], None), _warned(found.locking)]
+    head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
+    for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
+        cells = [
+            [r.solver.name, r.element, str(r.level),
+             significant(found.scale * float(getattr(r, by))),
+             significant(1e6 * (r.time_s or 0.0))]
+            for r in found.front(by).rows
+        ]  # fmt: skip
+        dominated = found.front(by).dominated
+        text = [f"dominated ({by}): {'; '.join(dominated)}"] if dominated else []
+        passages += [Passage(title, rows(head, cells), 3), sentences(text)]
+    answer(passages, found.done, done.page, common.detail)
     return OK
 
 
@@ -136,7 +183,22 @@ def choosing(name: str, common: StudyOptions, *, error: str, rate: str, declared
                 table("Excluded by a lower bound", head, [
                     [e.rung, e.candidate, _text(1e6 * e.bound), e.why] for e in choice.excluded
                 ])  # fmt: skip
-        answer(_choice_passages(choice), choice.trade.done, done.page, common.detail)
+        # The answer, then what each candidate method reaches
+        first, *others = words(choice)
+        cells = []
+        for c in choice.ladder:
+            measured = None if c.best is None else error_of(c.best, choice.by)
+            reached = _text(None if measured is None else choice.trade.scale * measured)
+            cells.append([c.rung, reached, c.verdict])
+        columns = ["", f"error / {choice.trade.shown_unit}", "verdict"]
+        passages = [
+            sentences([first], None),
+            sentences(others, None, keep=4),
+            _warned(choice.trade.locking),
+            Passage("Candidate methods", rows(columns, cells), 4),
+            sentences(choice.rejected, keep=1, most=4),
+        ]
+        answer(passages, choice.trade.done, done.page, common.detail)
     return OK if choice.pick is not None else FAILED
 
 
@@ -180,37 +242,6 @@ def answer(passages: Sequence[Passage], done: Finished[Any], page: Path, detail:
 # --- terminals ------------------------------------------------------------------------------------
 
 
-def _filter_passages(found: FilterStudy, detail: Detail) -> list[Passage]:
-    """The best settings first, then the places of each condition."""
-    passages = [
-        sentences([filter_page.sentence(found)], None),
-        sentences((b.line for b in found.best), None, keep=1, most=4),
-    ]
-    for ranking in found.rankings:
-        under = f" with {named(ranking.condition)}" if ranking.condition else ""
-        title = f"Ranking by {found.by}{under}"
-        passages.append(Passage(title, _places(ranking, found), 2, 11))
-        notes: list[str] = []
-        if len(found.plan.seeds) == 1:
-            notes += [] if ranking.blocks is None else [ranking.blocks.words]
-            notes += [] if ranking.nested is None else [chosen_line(ranking.nested, found)]
-        passages.append(sentences(notes, None, keep=1))
-    if detail == "screen" and len(found.rankings) > _RANKINGS:
-        left = len(found.rankings) - _RANKINGS
-        passages = [
-            *passages[: 2 + 2 * _RANKINGS],
-            Passage("", (f"{left} more conditions: --verbose",)),
-        ]
-    if found.plan.single_words:
-        passages.append(sentences([found.plan.single_words], None))
-    passages.append(Passage("", ("!: NIS outside its 95 % band; *: on the Pareto front",)))
-    failed = (
-        f"failed: {cell.name} ({named(cell.values)}): {why}"
-        for r in found.rankings for cell, why in r.failed
-    )  # fmt: skip
-    return [*passages, sentences(failed, keep=1, most=4)]
-
-
 def _places(ranking: Ranking, found: FilterStudy) -> tuple[str, ...]:
     """Place, settings where any were swept, error with its interval, NIS ("!" outside of its 95 %
     band), times of a step, and "*" on the Pareto front."""
@@ -234,59 +265,6 @@ def _text(entry: Entry | TableCell) -> str:
     if value is None:
         return MISSING
     return significant(value) if isinstance(value, float) else str(value)
-
-
-def _stability_passages(found: Stability, endings: str) -> list[Passage]:
-    quick = "QUICK: fewer points; " if found.quick else ""
-    cells = [
-        [p.name, _text(p.value), significant(p.limit), str(p.count),
-         "holds" if p.holds else "FAILS"]
-        for p in sorted(found.predictions, key=lambda p: p.holds)
-    ]  # fmt: skip
-    head = ["prediction", "worst / 1", "limit / 1", "count", "verdict"]
-    return [
-        sentences([f"{quick}{stability_page.sentence(found)}"], None),
-        sentences([endings] if endings else [], None),
-        Passage("Predictions against measured spectral radii", rows(head, cells), 3),
-    ]
-
-
-def _trade_passages(found: Trade) -> list[Passage]:
-    passages = [
-        sentences([trade_page.sentence(found)], None),
-        _warned(found.locking),
-    ]
-    head = ["", "element", "mesh", f"error / {found.shown_unit}", "time / µs"]
-    for by, title in (("error", "Pareto front, declared law"), ("total", "with the law's share")):
-        cells = [
-            [r.solver.name, r.element, str(r.level),
-             significant(found.scale * float(getattr(r, by))),
-             significant(1e6 * (r.time_s or 0.0))]
-            for r in found.front(by).rows
-        ]  # fmt: skip
-        dominated = found.front(by).dominated
-        text = [f"dominated ({by}): {'; '.join(dominated)}"] if dominated else []
-        passages += [Passage(title, rows(head, cells), 3), sentences(text)]
-    return passages
-
-
-def _choice_passages(choice: Choice) -> list[Passage]:
-    """The answer, then what each candidate method reaches."""
-    first, *others = words(choice)
-    cells = []
-    for c in choice.ladder:
-        error = None if c.best is None else error_of(c.best, choice.by)
-        reached = _text(None if error is None else choice.trade.scale * error)
-        cells.append([c.rung, reached, c.verdict])
-    head = ["", f"error / {choice.trade.shown_unit}", "verdict"]
-    ladder = rows(head, cells)
-    return [
-        sentences([first], None),
-        sentences(others, None, keep=4),
-        _warned(choice.trade.locking),
-        Passage("Candidate methods", ladder, 4),
-        sentences(choice.rejected, keep=1, most=4),
-    ]
 
 
 def _warned(texts: Sequence[str]) -> Passage:

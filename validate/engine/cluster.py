@@ -195,7 +195,19 @@ class Drain:
             return
 
     def _refill(self, queue: Queue) -> None:
-        workers = self._workers() if len(queue) else []
+        if not len(queue):
+            return
+        # Workers that proved their code; new ones are asked for it
+        there = self._there()
+        for worker in there:
+            if worker not in self._proven | self._refused:
+                self._ask(worker)
+        workers = [worker for worker in there if worker in self._proven]
+        if there and not workers and self._refused.issuperset(there):
+            raise UsageError(
+                f"all {len(there)} workers are refused; install the same version of validate "
+                "on them as in the study"
+            )
         most = max(1, self._ahead * len(workers))
         size = self._size(len(queue), most)
         while workers and len(self._sent) < most:
@@ -218,21 +230,6 @@ class Drain:
 
     def _there(self) -> list[str]:
         return sorted(self._client.scheduler_info(n_workers=-1)["workers"])
-
-    def _workers(self) -> list[str]:
-        """Workers that proved their code, new ones asked for it; raises `UsageError` where all are
-        refused."""
-        there = self._there()
-        for worker in there:
-            if worker not in self._proven | self._refused:
-                self._ask(worker)
-        trusted = [worker for worker in there if worker in self._proven]
-        if there and not trusted and self._refused.issuperset(there):
-            raise UsageError(
-                f"all {len(there)} workers are refused; install the same version of validate "
-                "on them as in the study"
-            )
-        return trusted
 
     def _ask(self, worker: str) -> None:
         """Has a worker prove its code, in a task of its own; one that goes away did not."""

@@ -68,10 +68,11 @@ def finish(
     folder.mkdir(parents=True, exist_ok=True)
     here = plan.job.identity()
     found = read_records(folder, (c.key for c in plan.cells), plan.kind, digest(here))
-    records = {
-        c.key: found.records[c.key] for c in plan.cells
-        if c.key in found.records and _says_enough(plan, c, found.records[c.key])
-    }  # fmt: skip
+    records = {}
+    for c in plan.cells:
+        record = found.records.get(c.key)
+        if record and (record.value is None or plan.enough(c, record.value)):
+            records[c.key] = record
     reused = len(records)
     for line in found.doubts:
         LOG.warning(line)
@@ -99,10 +100,6 @@ def finish(
         with Pool(where or Where(), (plan.run.__module__,), shares=plan.shares) as pool:
             said = _run(plan, left, pool, kept, tell, here)
     return Finished(records, reused, perf_counter() - start, said)
-
-
-def _says_enough(plan: Plan[C, R], cell: C, record: Record[R]) -> bool:
-    return record.value is None or plan.enough(cell, record.value)
 
 
 def _run(
@@ -153,8 +150,16 @@ def _shared(
 
     def by_workers() -> None:
         try:
-            if not _worth_it(queue, cells, plan.after):
-                return
+            # Whether the rest, and what comes after, takes longer than workers take to start, by
+            # what was done until now
+            start = perf_counter()
+            while len(queue):
+                sleep(_PATIENCE)
+                gone, finished = perf_counter() - start, cells - len(queue) - queue.running
+                if gone * (len(queue) + plan.after) > _WORTH * max(finished, 0.5):
+                    break
+            else:
+                return  # nothing is left
             from validate.engine.cluster import Drain
 
             Drain(plan, pool.client(), done, here, ahead=1).run(queue)
@@ -181,18 +186,6 @@ def _shared(
     if raised:
         raise raised[0]
     return pool.words if pool.busy else "this process"
-
-
-def _worth_it(queue: Queue, cells: int, after: int) -> bool:
-    """Whether the rest, and what comes `after`, takes longer than workers take to start, by what
-    was done until now; False once nothing is left."""
-    start = perf_counter()
-    while len(queue):
-        sleep(_PATIENCE)
-        gone, done = perf_counter() - start, cells - len(queue) - queue.running
-        if gone * (len(queue) + after) > _WORTH * max(done, 0.5):
-            return True
-    return False
 
 
 # --- cache of a worker between cells: the last few values by key ---------------------------------

@@ -69,11 +69,19 @@ def proven_installation() -> Identity:
 def identity_of(files: Iterable[Path], module: str) -> Identity:
     """Return the installation with the hashes of the files of an experiment and of the user's own
     modules that the loaded module of that name refers to."""
-    own = sorted(_modules(sys.modules.get(module)).items())
+    modules: dict[str, Path] = {}
+    left = [sys.modules.get(module)]
+    while left:
+        one = left.pop()
+        file = getattr(one, "__file__", None)
+        if one is None or file is None or one.__name__ in modules or not _is_users(Path(file)):
+            continue
+        modules[one.__name__] = Path(file)
+        left += [_home(value) for value in vars(one).values()]
     return {
         **installation(),
         "experiment": _hash((file.name, file) for file in files),
-        "modules": _hash(own),
+        "modules": _hash(sorted(modules.items())),
     }
 
 
@@ -100,21 +108,6 @@ def _hash(files: Any) -> str:
     for name, path in files:
         found.update(name.encode() + b"\0" + path.read_bytes())
     return found.hexdigest()
-
-
-def _modules(first: ModuleType | None) -> dict[str, Path]:
-    """Files by name of the user's modules that a module refers to, itself and what they refer to
-    among them."""
-    found: dict[str, Path] = {}
-    left = [first]
-    while left:
-        module = left.pop()
-        file = getattr(module, "__file__", None)
-        if module is None or file is None or module.__name__ in found or not _is_users(Path(file)):
-            continue
-        found[module.__name__] = Path(file)
-        left += [_home(value) for value in vars(module).values()]
-    return found
 
 
 def _home(value: Any) -> ModuleType | None:

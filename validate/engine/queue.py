@@ -33,7 +33,11 @@ class Queue:
     def take(self, most: int = 1) -> Batch:
         """At most so many of the next cells, timed ones singly; () where none may start now."""
         with self._lock:
-            if not self._waiting or not self._may_start(self._waiting[0]):
+            if not self._waiting:
+                return ()
+            running = [c for batch in self._running for c in batch]
+            timed = any(c.timed for c in (self._waiting[0], *running))
+            if timed and len(self._running) >= self._beside:
                 return ()
             batch: Batch = (self._waiting.popleft(),)
             while len(batch) < most and self._waiting:
@@ -56,7 +60,3 @@ class Queue:
         """Nothing is taken any more."""
         with self._lock:
             self._waiting.clear()
-
-    def _may_start(self, cell: Any) -> bool:
-        timed = cell.timed or any(c.timed for batch in self._running for c in batch)
-        return not timed or len(self._running) < self._beside

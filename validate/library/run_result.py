@@ -165,28 +165,24 @@ class RunResult:
 
     @property
     def _screen(self) -> Screen:
-        rows = tuple(
-            (c.method, c.name, _with_interval(c.value, c.u_val, c.unit),
-             "–" if c.limit is None else text(c.limit, c.unit), c.verdict)
-            for c in self.checks
-        )  # fmt: skip
+        rows = []
+        for c in self.checks:
+            error = with_unit(c.value, c.unit)
+            if c.value is not None and c.u_val is not None:  # both to one decimal
+                factor = scale(c.unit)
+                half, shown = to_decimal_of(2 * c.u_val * factor, c.value * factor)
+                error = f"{shown} ± {half} {shown_unit(c.unit)}".strip()
+            limit = "–" if c.limit is None else text(c.limit, c.unit)
+            rows.append((c.method, c.name, error, limit, c.verdict))
         below = (f"methods: {listed(self.methods)}", f"report: {self.report}")
         head = ("method", "check", "E ± 2 u_val", "limit", "verdict")
-        return Screen(f"{self.name}: {self.verdict}", (self.sentence,), head, rows, below)
+        return Screen(f"{self.name}: {self.verdict}", (self.sentence,), head, tuple(rows), below)
 
     def __repr__(self) -> str:
         return self._screen.text
 
     def _repr_html_(self) -> str:
         return self._screen.html
-
-
-def _with_interval(value: float | None, u_val: float | None, unit: str) -> str:
-    """E ± 2 u_val in the shown unit, to one decimal."""
-    if value is None or u_val is None:
-        return with_unit(value, unit)
-    half, error = to_decimal_of(2 * u_val * scale(unit), value * scale(unit))
-    return f"{error} ± {half} {shown_unit(unit)}".strip()
 
 
 def open_run(path: str | Path) -> RunResult:

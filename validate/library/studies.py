@@ -99,7 +99,7 @@ def filters(
 
 def stability_map(experiment: Experiment, settings: StudySettings) -> Studied[StabilityFound]:
     """Map where schemes are stable; of a static experiment the gain of its loop, if it has one."""
-    place = f"stability{_quick(settings)}"
+    place = f"stability{tag(['quick'] * settings.quick, settings.quick)}"
     out, quick, where = settings.out, settings.quick, settings.where
     with _running(experiment, place, "stability", settings) as report:
         found = stability(experiment, quick=quick, out=out, where=where, report=report)
@@ -216,11 +216,6 @@ def seeds_of(text: str) -> int | tuple[int, ...]:
             f"--seeds {text}: expected a number of seeds, or seeds separated by commas"
         ) from None
     return numbers if len(numbers) > 1 else numbers[0]
-
-
-def _quick(settings: StudySettings) -> str:
-    """A quick study has a folder of its own."""
-    return tag(["quick"] * settings.quick, settings.quick)
 
 
 @contextmanager

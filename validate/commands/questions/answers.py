@@ -110,9 +110,25 @@ def answered(
             break
         question = pending[0]
         if question.key in given:
-            found[question.key] = question.checked(_beside(question, given[question.key], folder))
+            answer = given[question.key]
+            names_file = question.words is not None and answer and answer not in question.words
+            if folder is not None and names_file:  # as it is from here
+                try:
+                    answer = os.path.relpath(inside(folder, answer))
+                except RecordingError as error:
+                    raise UsageError(f"{question.key}: {error}") from None
+            found[question.key] = question.checked(answer)
         elif terminal:
-            found[question.key] = _prompted(question)
+            for line in _explained(question):
+                say(line, indent="  ")
+            while question.key not in found:
+                prompted = click.prompt(
+                    question.key, default=question.default, show_default=bool(question.default)
+                )
+                try:
+                    found[question.key] = question.checked(str(prompted))
+                except UsageError as error:
+                    say(str(error), "yellow", "  ")
         elif question.open:
             left[question.key] = question
         else:
@@ -129,16 +145,6 @@ def answered(
             f"no question has the key {', '.join(unknown)}; {nearest_names(unknown[0], set(found))}"
         )
     return found
-
-
-def _beside(question: Question, answer: str, folder: Path | None) -> str:
-    """The name of a file as it is from here, where a file of answers in `folder` gives it."""
-    if folder is None or question.words is None or not answer or answer in question.words:
-        return answer
-    try:
-        return os.path.relpath(inside(folder, answer))
-    except RecordingError as error:
-        raise UsageError(f"{question.key}: {error}") from None
 
 
 def on_a_terminal() -> bool:
@@ -176,16 +182,3 @@ def _explained(question: Question) -> list[str]:
     elif question.why:
         lines.append(f"'{question.default}': {question.why}")
     return lines
-
-
-def _prompted(question: Question) -> str:
-    for line in _explained(question):
-        say(line, indent="  ")
-    while True:
-        answer = click.prompt(
-            question.key, default=question.default, show_default=bool(question.default)
-        )
-        try:
-            return question.checked(str(answer))
-        except UsageError as error:
-            say(str(error), "yellow", "  ")

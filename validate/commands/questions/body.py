@@ -104,7 +104,20 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     forces = [t for t, s in recording.signals.items() if s.unit == "N"]
     if forces and unit_of(recording, found.get("moved.by", "")) == "m":
         asked.append(by_topic("seen.force", "force on the moved place to compare", forces))
-    asked += _of_the_material(recording, found)
+    # The modulus is open only under a displacement with a force that is judged
+    sought = found.get("seen.force", NONE) != NONE
+    way = f"; {UNKNOWN}: identify it on the lower part of the load" if sought else ""
+    asked += [
+        Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
+                 check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
+        by_path("material.nu", "Poisson ratio"),
+    ]  # fmt: skip
+    if unit_of(recording, found.get("moved.by", "")) == "Pa":
+        asked.append(Question("law", "law of the material", LINEAR, "the pressure acts on the "
+                              "undeformed surface", choices=(LINEAR,)))  # fmt: skip
+    else:
+        why = "large strain; the linear law is run in addition"
+        asked += law_questions(found, "neo_hooke", why)
     asked += motion_questions(recording, found, mesh)
     words = {"E": "modulus (relative)", "nu": "Poisson ratio",
              "load": "load (relative)"}  # fmt: skip
@@ -123,22 +136,6 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
             for k, text in words.items()
         ),
     ]
-
-
-def _of_the_material(recording: Recording, found: Answers) -> list[Question]:
-    """The modulus is open only under a displacement with a force that is judged."""
-    sought = found.get("seen.force", NONE) != NONE
-    way = f"; {UNKNOWN}: identify it on the lower part of the load" if sought else ""
-    pressed = unit_of(recording, found.get("moved.by", "")) == "Pa"
-    return [
-        Question("material.E", f"Young's modulus, Pa or as 15kPa{way}", open=True,
-                 check=parsed("material.E", UNKNOWN) if sought else a_known_modulus),
-        by_path("material.nu", "Poisson ratio"),
-        *([Question("law", "law of the material", LINEAR, "the pressure acts on the "
-                    "undeformed surface", choices=(LINEAR,))] if pressed else
-          law_questions(found, "neo_hooke", "large strain; the linear law is run "
-                        "in addition")),
-    ]  # fmt: skip
 
 
 def _of_the_load(recording: Recording, mesh: Mesh | None, found: Answers) -> list[Question]:
@@ -266,8 +263,12 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
             states = states_within(RUNS, unknowns_of(here, order, Path()), seen.states)
             here = here.with_settings(seen=replace(seen, states=states))
         maker = "touching" if pressed else "solid"
-        methods = _methods(found["law"], maker, _cells(found, mesh, order))
-        accepted = "solid" if found["law"] != "linear" else "linear"
+        law, of_cells = found["law"], _cells(found, mesh, order)
+        methods = [f'"linear": {maker}("linear law, {of_cells}", "linear"),']
+        if law != "linear":
+            words = f"{law_kind(law).title}, {of_cells}"
+            methods.insert(0, f'"solid": {maker}("{words}", "{law}"),')
+        accepted = "solid" if law != "linear" else "linear"
     # Files as they are found from the experiment's folder
     declared, streams = here, here.settings.seen
     if isinstance(body := here.scene.body, MeshFile):
@@ -304,14 +305,6 @@ def _cells(found: Answers, mesh: Mesh | None, order: int) -> str:
     if outlined or (found["body.shape"] == "file" and not (mesh is not None and mesh.bricks)):
         return "quadratic tetrahedra" if order == 2 else "linear tetrahedra"
     return "quadratic hexahedra" if order == 2 else "mixed hexahedra"
-
-
-def _methods(law: str, maker: str, cells: str) -> list[str]:
-    lines = [f'"linear": {maker}("linear law, {cells}", "linear"),']
-    if law != "linear":
-        words = f"{law_kind(law).title}, {cells}"
-        lines.insert(0, f'"solid": {maker}("{words}", "{law}"),')
-    return lines
 
 
 def _used(recording: Recording, found: Answers) -> set[str]:

@@ -1,8 +1,7 @@
 """Questions about the constitutive law of a material and its coefficients."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
-from typing import Any
 
 from validate.commands.questions.answers import Answers, Question
 from validate.parameters import with_values
@@ -48,24 +47,19 @@ def left_open(found: Answers) -> set[str]:
 
 def _of_coefficient(found: Answers, name: str, *, last: bool) -> Question:
     (f,) = (f for f in fields(coefficients_of(found)) if f.name == name)
-    unit = f.metadata["unit"]
-    text = f"{f.metadata['doc']}{'' if unit == '1' else f'; {unit}'}"
-    may_be_empty = f.default == ()
-    return Question(
-        f"material.{name}", text + ("; empty: none" if may_be_empty else ""),
-        open=not may_be_empty, check=_checked(found, f, last=last),
-    )  # fmt: skip
-
-
-def _checked(found: Answers, f: Any, *, last: bool) -> Callable[[str], Any]:
-    """A check of one number; lists have to agree and are checked with the last one."""
 
     def check(text: str) -> None:
-        values: Mapping[str, str] = {f.name: text}
-        if last:
+        values: Mapping[str, str] = {name: text}
+        if last:  # lists have to agree, and are checked with the last one
             own = coefficient_values(found)
             values = {**{k.removeprefix("material."): v for k, v in own.items()}, **values}
         if last or isinstance(f.default, float):
             with_values(coefficients_of(found)(), values)
 
-    return check
+    unit = f.metadata["unit"]
+    text = f"{f.metadata['doc']}{'' if unit == '1' else f'; {unit}'}"
+    may_be_empty = f.default == ()
+    return Question(
+        f"material.{name}", text + ("; empty: none" if may_be_empty else ""),
+        open=not may_be_empty, check=check,
+    )  # fmt: skip

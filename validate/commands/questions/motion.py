@@ -246,7 +246,17 @@ def cells_for(found: Answers) -> int:
 
 def moving_methods(recording: Recording, p: Tree, found: Answers, order: int) -> list[str]:
     """Lines of the chosen methods, in the order of `offered`."""
-    law, given = cast(LawName, found["law"]), _measurements(recording, p, found)
+    # What filters are given: markers, or the outline where only one marker is compared
+    markers, outline = judged_markers(recording, p), p.settings.seen.outline
+    given: tuple[str, ...] = ()
+    if len(markers) > 1:
+        given = _given(recording, p, markers)
+    elif outline or markers:
+        given = (outline or markers[0],)
+    answer = found.get(GIVEN, "")
+    if given and answer not in ("", ",".join(given)):
+        given = _listed(answer)
+    law = cast(LawName, found["law"])
     chosen = _listed(found.get(CHOSEN, "")) or proposed_methods(recording, p, found)
     names = [name for name in offered(recording, p, found) if name in chosen]
     return [_line(name, (recording, p), law, order, given) for name in names]
@@ -263,22 +273,19 @@ def offered(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
     undamped = not (beta or motion.damping_ratio or motion.fit_window)
     explicit = undamped and not mesh_of(p, Path()).bricks
     small = unknowns_of(p, 1, Path()) <= _FILTERED
-    creeps = measured and not preloaded and _creeps(recording, p)
+    creeps = False  # returns without swinging, as a filter without inertia takes it
+    if measured and not preloaded:
+        ratio = motion.damping_ratio
+        if ratio is None:
+            first = _first(recording, p, Path()) if beta else None
+            ratio = np.pi * first * beta if first else 0.0
+        creeps = bool(ratio >= OVERDAMPED)
     return tuple(
         name for name in _ORDER
         if (small or name not in _OF_NODES) and (explicit or name not in EXPLICIT_FILTERS)
         and (creeps or name != "load_scale")
         and fits_motion(name, law, kind, preloaded=preloaded, measured=measured)
     )  # fmt: skip
-
-
-def _creeps(recording: Recording, p: Tree) -> bool:
-    """Whether the body returns without swinging, as a filter without inertia takes it."""
-    ratio, beta = p.settings.motion.damping_ratio, p.scene.material.stiffness_damping
-    if ratio is None:
-        first = _first(recording, p, Path()) if beta else None
-        ratio = np.pi * first * beta if first else 0.0
-    return bool(ratio >= OVERDAMPED)
 
 
 def proposed_methods(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
@@ -325,21 +332,17 @@ def _line(
         dt = float(steps_of(without_rest(p), cut)[0])
         parts.append(f"split={max(1, ceil(dt / limit))}")
     if kind not in ("moves", "follows"):
-        unsure = f"{_LOAD * _largest(recording, p, kind):.3g}"
+        # The largest load, in its unit
+        if kind == "weighs":
+            largest = _GRAVITY
+        elif kind == "releases":
+            largest = p.settings.motion.held_force or 0.1
+        else:
+            largest = float(np.ptp(recording.signals[mover(p.scene).name].y))
+        unsure = f"{_LOAD * largest:.3g}"
         walks = ("load_start", "load_walk", "load_sd")
         parts += [f"{w}={unsure}" for w in walks if hasattr(settings, w)]
     return f'"{name}": moving({", ".join(parts)}),'
-
-
-def _measurements(recording: Recording, p: Tree, found: Answers) -> tuple[str, ...]:
-    """What filters are given: markers, or the outline where only one marker is compared."""
-    names, answer = judged_markers(recording, p), found.get(GIVEN, "")
-    if not names and not p.settings.seen.outline:
-        return ()
-    given = (
-        _given(recording, p, names) if len(names) > 1 else (p.settings.seen.outline or names[0],)
-    )
-    return _listed(answer) if answer not in ("", ",".join(given)) else given
 
 
 def _given(recording: Recording, p: Tree, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -355,15 +358,6 @@ def _given(recording: Recording, p: Tree, names: tuple[str, ...]) -> tuple[str, 
 def _seen(x: Floats) -> Floats:
     kept = x[np.isfinite(x).all(axis=1)]
     return kept if len(kept) else np.zeros((1, x.shape[1]))
-
-
-def _largest(recording: Recording, p: Tree, kind: str) -> float:
-    """Of the load, in its unit."""
-    if kind == "weighs":
-        return _GRAVITY
-    if kind == "releases":
-        return p.settings.motion.held_force or 0.1
-    return float(np.ptp(recording.signals[mover(p.scene).name].y))
 
 
 def judged_markers(recording: Recording, p: Tree) -> tuple[str, ...]:

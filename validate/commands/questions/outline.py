@@ -118,14 +118,6 @@ def fields(found: Answers) -> dict[str, str]:
     """What stands in the file: empty where no outlines are judged."""
     if not whole(found):
         return {"outline": "", "accept_outline": ""}
-    return {
-        "outline": "        # The images and their position, m.\n"
-                   f"        outline={_card(found)},\n",
-        "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
-    }  # fmt: skip
-
-
-def _card(found: Answers) -> str:
     keys = ("topic", "surface", "origin", "image_x", "image_y", "sd")
     said = {k: found[f"outline.{k}"] for k in keys if f"outline.{k}" in found}
     values = {f"outline.{k}": v for k, v in said.items() if v != _RECORDED}
@@ -133,13 +125,16 @@ def _card(found: Answers) -> str:
     told = [
         f"{f.name}={v!r}" for f in attributes(card) if (v := getattr(card, f.name)) != f.default
     ]
-    short_call = f"PressedOutline({', '.join(told)})"
-    if len(short_call) < _WIDTH:
-        return short_call
-    lines: list[str] = []
-    last = told[0]
-    for piece in told[1:]:  # a text may hold spaces: no piece is broken
-        short = len(last) + len(piece) < _WIDTH
-        lines, last = (lines, f"{last}, {piece}") if short else ([*lines, last], piece)
-    body = "".join(f"            {line},\n" for line in (*lines, last))
-    return f"PressedOutline(\n{body}        )"
+    call = f"PressedOutline({', '.join(told)})"
+    if len(call) >= _WIDTH:
+        lines: list[str] = []
+        last = told[0]
+        for piece in told[1:]:  # a text may hold spaces: no piece is broken
+            short = len(last) + len(piece) < _WIDTH
+            lines, last = (lines, f"{last}, {piece}") if short else ([*lines, last], piece)
+        body = "".join(f"            {line},\n" for line in (*lines, last))
+        call = f"PressedOutline(\n{body}        )"
+    return {
+        "outline": f"        # The images and their position, m.\n        outline={call},\n",
+        "accept_outline": f"\n        {accept_line('contour', 'm', found)}",
+    }

@@ -55,45 +55,36 @@ def _asks(recording: Recording, folder: Path, found: Answers) -> Sequence[Questi
     if not stated_test(recording):
         asked.append(Question("test", "whether the test presses or pulls", open=True,
                               choices=tuple(_WORDS)))  # fmt: skip
-    if found.get("body.file") is not None:
-        asked += _of_the_sizes(recording, found)
+    file = found.get("body.file")
+    if file is not None and not (file and specimen_mesh(found) is None):  # its unit is known
+        known, length = _known_sizes(recording, found), quantity_in("m")
+        asked += [
+            Question(f"body.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
+                     check=length)
+            for name in _SIZES if f"body.{name}" not in known
+        ]  # fmt: skip
     asked += new_outline.place_questions(recording, found)
     if not new_outline.filled(found):  # a fluid inside needs the linear law
         asked += law_questions(found, LINEAR, "it holds to strains of about 0.1")
-    return [*asked, *_accepts(recording, found)]
-
-
-def _of_the_sizes(recording: Recording, found: Answers) -> list[Question]:
-    known, length = _known_sizes(recording, found), quantity_in("m")
-    if found["body.file"] and specimen_mesh(found) is None:
-        return []  # its unit is still open
+    # Without a height the force at the strain limit is not known yet, so that no number is shown
+    # that would stay when the height is answered
+    what, check = "largest acceptable error of the force, N", quantity_in("N")
+    height, limit, judged = _judged(recording, found)[1:]
+    if height is None:
+        what += "; empty: a tenth of the force at the strain limit"
+        return [*asked, Question("accept.force", what, check=check), reason_question("force")]
+    own = found.get("accept.force", f"{limit:.3g}") != f"{limit:.3g}"
+    why = f"a tenth of {judged}"
     return [
-        Question(f"body.{name}", f"{_what(name, recording)}, in m or as 25mm; empty: left open",
-                 check=length)
-        for name in _SIZES if f"body.{name}" not in known
-    ]  # fmt: skip
+        *asked,
+        Question("accept.force", what, f"{limit:.3g}", f"{why}, assumed", check=check),
+        reason_question("force", "" if own else why),
+    ]
 
 
 def _known_sizes(recording: Recording, found: Answers) -> dict[str, float]:
     """Sizes m by path: those of the mesh, else those of the recording."""
     return {**stated_sizes(recording), **mesh_sizes(found)}
-
-
-def _accepts(recording: Recording, found: Answers) -> tuple[Question, Question]:
-    """Without a height the force at the strain limit is not known yet, so that no number is shown
-    that would stay when the height is answered."""
-    what, check = "largest acceptable error of the force, N", quantity_in("N")
-    height, limit, judged = _judged(recording, found)[1:]
-    if height is None:
-        what += "; empty: a tenth of the force at the strain limit"
-        return Question("accept.force", what, check=check), reason_question("force")
-    own = found.get("accept.force", f"{limit:.3g}") != f"{limit:.3g}"
-    return (
-        Question(
-            "accept.force", what, f"{limit:.3g}", f"a tenth of {judged}, assumed", check=check
-        ),
-        reason_question("force", "" if own else f"a tenth of {judged}"),
-    )  # fmt: skip
 
 
 def _what(name: str, recording: Recording) -> str:
@@ -137,6 +128,9 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
     default = "" if own and f"{said:.3g}" != f"{accepted:.3g}" else f"a tenth of {judged}"
     reason = found.get("why.force") or default
     law, mesh = found.get("law", LINEAR), declared_mesh(found, folder)
+    part = "" if new_outline.whole(found) else ', part="quarter"'
+    sizes = "".join(f"            {name}={_size(name, recording, found)}\n" for name in _SIZES)
+    cylinder = f'Cylinder(\n{sizes}            cells=(4, 4), element="tet10"{part},\n        ),'
     # The fluid, and whose volume change counts in linear cells
     lines = []
     if new_outline.filled(found):
@@ -145,7 +139,7 @@ def _fields(recording: Recording, source: str, folder: Path, found: Answers) -> 
         lines.append('dilatation="nodal_mean",')
     return {
         "imports": "\n".join(sorted(_imports(found))),
-        "body": mesh or _cylinder(recording, found),
+        "body": mesh or cylinder,
         "test": f"{test}, {'recorded' if stated_test(recording) else 'answered'}",
         "along": "-z" if test == "compression" else "+z",
         "rests": ", rests=True" if mesh or new_outline.whole(found) else "",
@@ -208,12 +202,6 @@ def _coefficients(found: Answers) -> str:
         for f in fields(given) if (value := getattr(given, f.name)) != f.default
     )  # fmt: skip
     return f", coefficients={type(given).__name__}({parts})" if parts else ""
-
-
-def _cylinder(recording: Recording, found: Answers) -> str:
-    part = "" if new_outline.whole(found) else ', part="quarter"'
-    sizes = "".join(f"            {name}={_size(name, recording, found)}\n" for name in _SIZES)
-    return f'Cylinder(\n{sizes}            cells=(4, 4), element="tet10"{part},\n        ),'
 
 
 def _size(name: str, recording: Recording, found: Answers) -> str:

@@ -187,7 +187,25 @@ def geometry_of(found: Answers, cells: int, order: int, reach: float = -1.0) -> 
     bricks = found.get("seen.outline", NONE) == NONE
     kind: Any = ("hex" if bricks else "tet") + str({(1, 1): 8, (1, 2): 27, (0, 1): 4, (0, 2): 10}[
         (int(bricks), order)])  # fmt: skip
-    n = divided(_ideal(sizes, cells), _even(found, sizes))
+    even: tuple[bool, ...] = ()
+    if found.get("held.slides") and len(sizes) == 3:
+        # Every grid has a middle in the plane of the place that it rests on: that middle stays
+        across = _across(found["held.slides"], Box(sizes, (1, 1, 1), "hex8").resolved(Path()))
+        even = tuple(c != across for c in range(3))
+    # Cells per axis (of a cylinder along radius and height): cubes where the body is compact. A
+    # slender or thin body has `_ACROSS` cells across it, at most `_ASPECT` times as long as they
+    # are thick, as far as `_UNKNOWNS` allow
+    round_ = len(sizes) == 2
+    spans = (sizes[0] / 2, sizes[1]) if round_ else sizes
+
+    def of_edge(edge: float) -> tuple[float, ...]:
+        return tuple(max(span / edge, _ACROSS) for span in spans)
+
+    cubes = max(sizes) / cells
+    edge = min(cubes, _ASPECT * (min(spans) / _ACROSS))
+    while edge < cubes and grid_unknowns(of_edge(edge), round_=round_) > _UNKNOWNS:
+        edge = min(1.1 * edge, cubes)
+    n = divided(of_edge(edge), even)
     if len(sizes) == 3:
         return Box(sizes, n, kind)
     return Cylinder(sizes[0], sizes[1], (n[0], n[1]), kind)
@@ -198,35 +216,6 @@ def sides_of(found: Answers) -> tuple[float, ...]:
     if found.get("body.block"):
         return sides(found["body.block"], 3)
     return sides(found["body.cylinder"], 2)
-
-
-def _ideal(lengths: tuple[float, ...], along: int) -> tuple[float, ...]:
-    """Cells per axis (of a cylinder along radius and height): cubes where the body is compact.
-
-    A slender or thin body has `_ACROSS` cells across it, at most `_ASPECT` times as long as they
-    are thick, as far as `_UNKNOWNS` allow.
-    """
-    round_ = len(lengths) == 2
-    divided_ = (lengths[0] / 2, lengths[1]) if round_ else lengths
-    thick = min(divided_) / _ACROSS
-
-    def cells(edge: float) -> tuple[float, ...]:
-        return tuple(max(length / edge, _ACROSS) for length in divided_)
-
-    cubes = max(lengths) / along
-    edge = min(cubes, _ASPECT * thick)
-    while edge < cubes and grid_unknowns(cells(edge), round_=round_) > _UNKNOWNS:
-        edge = min(1.1 * edge, cubes)
-    return cells(edge)
-
-
-def _even(found: Answers, lengths: tuple[float, ...]) -> tuple[bool, ...]:
-    """Axes of a block along which every grid has a middle: in the plane of a place that it rests
-    on, whose middle stays. A cylinder has an axis."""
-    if not found.get("held.slides") or len(lengths) == 2:
-        return ()
-    across = _across(found["held.slides"], Box(lengths, (1, 1, 1), "hex8").resolved(Path()))
-    return tuple(c != across for c in range(3))
 
 
 def _across(place: str, mesh: Mesh) -> int:

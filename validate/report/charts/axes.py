@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.ticker import (
     FixedLocator,
     FuncFormatter,
@@ -76,11 +75,39 @@ def band_of(series: Series, labels: Sequence[str]) -> str:
 
 def styled(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
     """Measured points black, methods as elsewhere, bands in their line's colour, others in turn."""
-    found = _of_lines(result, [s for s in series if s.style != "band"])
-    lines = {d.series.label: d.look for d in found if d.series.style == "line"}
-    bands = [Drawn(s, _of_band(s, lines)) for s in series if s.style == "band"]
-    pairs = {id(d.series): d for d in (*found, *bands)}
-    return [pairs[id(s)] for s in series]
+    known = _known(result)
+    others = [s for s in series if s.style != "band"]
+    unknown = [s for s in others if s.label not in known and not is_given(s)]
+    # By label the methods' styles; of two with one colour or dash the later takes a free one
+    mine: dict[str, Style] = {}
+    for label, look in {s.label: known[s.label] for s in others if s.label in known}.items():
+        colours = {s.colour for s in mine.values()}
+        free = [c for c in (look.colour, *PALETTE) if c not in colours] or [look.colour]
+        other = replace(look, colour=free[0])
+        for i in range(1, len(PALETTE)):
+            if all(other.dash != s.dash for s in mine.values()):
+                break
+            turned = free_look(i, other.colour)
+            other = replace(other, dash=turned.dash, point=turned.point)
+        mine[label] = other
+    taken = {look.colour for look in mine.values()}
+    free = [c for c in PALETTE if c not in taken] or list(PALETTE)
+    turns = {id(s): free_look(i, free[i % len(free)]) for i, s in enumerate(unknown)}
+    signs = {id(s): i + 1 for i, s in enumerate(unknown)} if len(unknown) > len(free) else {}
+    logs = (s for s in others if s.style == "points" and is_given(s))
+    shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
+    drawn = {}
+    for s in others:
+        # A reference is a wide pale line under the others, what was measured dark points
+        shade, width = ("#C0C0C0", 3.6) if s.style == "line" else (shades.get(id(s), MEASURED), 1.2)
+        given = Style(shade, "-", "o", width)
+        drawn[id(s)] = Drawn(s, mine.get(s.label) or turns.get(id(s)) or given, signs.get(id(s), 0))
+    lines = {d.series.label: d.look for d in drawn.values() if d.series.style == "line"}
+    for s in series:
+        if s.style == "band":
+            own = band_of(s, tuple(lines))
+            drawn[id(s)] = Drawn(s, lines[own] if own else Style(NOISE, "-", "o", 0.0))
+    return [drawn[id(s)] for s in series]
 
 
 def alone(result: HasMethods, series: Sequence[Series], label: str) -> list[Drawn]:
@@ -99,45 +126,6 @@ def alone(result: HasMethods, series: Sequence[Series], label: str) -> list[Draw
     ]  # fmt: skip
 
 
-def _of_lines(result: HasMethods, series: Sequence[Series]) -> list[Drawn]:
-    known = _known(result)
-    unknown = [s for s in series if s.label not in known and not is_given(s)]
-    # By label the methods' styles; of two with one colour or dash the later takes a free one
-    named = [(s.label, known[s.label]) for s in series if s.label in known]
-    mine: dict[str, Style] = {}
-    for label, look in dict(named).items():
-        colours = {s.colour for s in mine.values()}
-        free = [c for c in (look.colour, *PALETTE) if c not in colours] or [look.colour]
-        other = replace(look, colour=free[0])
-        for i in range(1, len(PALETTE)):
-            if all(other.dash != s.dash for s in mine.values()):
-                break
-            turned = free_look(i, other.colour)
-            other = replace(other, dash=turned.dash, point=turned.point)
-        mine[label] = other
-    taken = {look.colour for look in mine.values()}
-    free = [c for c in PALETTE if c not in taken] or list(PALETTE)
-    others = {id(s): free_look(i, free[i % len(free)]) for i, s in enumerate(unknown)}
-    signs = {id(s): i + 1 for i, s in enumerate(unknown)} if len(unknown) > len(free) else {}
-    logs = (s for s in series if s.style == "points" and is_given(s))
-    shades = {id(s): _SHADES[i % len(_SHADES)] for i, s in enumerate(logs)}
-    return [
-        Drawn(
-            s,
-            mine.get(s.label) or others.get(id(s)) or _given(s, shades.get(id(s), MEASURED)),
-            signs.get(id(s), 0),
-        )
-        for s in series
-    ]
-
-
-def _given(series: Series, shade: str) -> Style:
-    """A reference is a wide pale line under the others, what was measured dark points."""
-    if series.style == "line":
-        return Style("#C0C0C0", "-", "o", 3.6)
-    return Style(shade, "-", "o", 1.2)
-
-
 def _known(result: HasMethods) -> Mapping[str, Style]:
     styles = looks(result)
     return {**styles, **{m.label: styles[m.name] for m in result.methods}}
@@ -148,11 +136,6 @@ def is_given(one: Series) -> bool:
     if one.style == "line":
         return one.label.lower().startswith("reference")
     return one.style == "points" and "measured" in one.label.lower()
-
-
-def _of_band(band: Series, lines: Mapping[str, Style]) -> Style:
-    own = band_of(band, tuple(lines))
-    return lines[own] if own else Style(NOISE, "-", "o", 0.0)
 
 
 def is_jagged(series: Series) -> bool:
@@ -186,10 +169,27 @@ def fill_axes(ax: Axes, chart: Chart, drawn: Sequence[Drawn]) -> None:
         ax.axhline(0, color=MEASURED, lw=0.8)
     floor = floor_of(chart)
     for d in sorted(drawn, key=lambda d: (_layer(d.series), -d.look.width)):
-        _draw_one(ax, d, floor)
-    for i, (name, y) in enumerate(levels(chart)):
-        colour, dash = _LEVELS[i % len(_LEVELS)]
-        ax.axhline(y, color=colour, lw=1.0, ls=(0, dash), zorder=1.5, label=name)
+        s, look = d.series, d.look
+        y = np.where(s.y < floor, np.nan, s.y) if floor else s.y
+        if s.style == "band":
+            upper = s.upper if s.upper is not None else np.zeros_like(s.y)
+            shade: dict[str, Any] = {"color": look.colour, "alpha": 1.0 if look.width == 0 else 0.2}
+            ax.fill_between(s.x, s.y, upper, lw=0, label=s.name, **shade)
+        elif s.style == "points":
+            size = 4.5 if len(s.x) <= _SPARSE else 3.0 if len(s.x) <= _MANY else 1.6
+            sign, size = (f"${d.number}$", 7.0) if d.number else (look.point, size)
+            ax.plot(s.x, y, ls="none", marker=sign, color=look.colour, ms=size, mew=0.6,
+                    label=s.name)  # fmt: skip
+        else:
+            marker = look.point if len(s.x) <= _FEW else ""
+            thin = is_jagged(s) and not d.one_of
+            dash, width = ("-", min(look.width, 0.9)) if thin else (look.dash, look.width)
+            ring: dict[str, Any] = {"mfc": "none", "ms": 9} if len(s.x) == 1 else {"ms": 4.5}
+            ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, label=s.name,
+                    **ring)  # fmt: skip
+    for i, (name, level) in enumerate(levels(chart)):
+        colour, dashes = _LEVELS[i % len(_LEVELS)]
+        ax.axhline(level, color=colour, lw=1.0, ls=(0, dashes), zorder=1.5, label=name)
 
 
 def levels(chart: Chart) -> list[tuple[str, float]]:
@@ -203,29 +203,6 @@ def _layer(series: Series) -> int:
     if series.style == "points":
         return 3 if len(series.x) <= _SPARSE else 1
     return 0 if series.style == "band" else 2
-
-
-def _draw_one(ax: Axes, drawn: Drawn, floor: float) -> None:
-    s, look = drawn.series, drawn.look
-    y = np.where(s.y < floor, np.nan, s.y) if floor else s.y
-    if s.style == "band":
-        shade: dict[str, Any] = {"color": look.colour, "alpha": 1.0 if look.width == 0 else 0.2}
-        ax.fill_between(s.x, s.y, _upper(s), lw=0, label=s.name, **shade)
-    elif s.style == "points":
-        size = 4.5 if len(s.x) <= _SPARSE else 3.0 if len(s.x) <= _MANY else 1.6
-        sign, size = (f"${drawn.number}$", 7.0) if drawn.number else (look.point, size)
-        ax.plot(s.x, y, ls="none", marker=sign, color=look.colour, ms=size, mew=0.6,
-                label=s.name)  # fmt: skip
-    else:
-        marker = look.point if len(s.x) <= _FEW else ""
-        thin = is_jagged(s) and not drawn.one_of
-        dash, width = ("-", min(look.width, 0.9)) if thin else (look.dash, look.width)
-        ring: dict[str, Any] = {"mfc": "none", "ms": 9} if len(s.x) == 1 else {"ms": 4.5}
-        ax.plot(s.x, y, color=look.colour, ls=dash, lw=width, marker=marker, label=s.name, **ring)
-
-
-def _upper(band: Series) -> Any:
-    return band.upper if band.upper is not None else np.zeros_like(band.y)
 
 
 # --- rounding ------------------------------------------------------------------------------------
@@ -305,25 +282,21 @@ def readable(ax: Axes, chart: Chart, most: int = 6) -> None:
             axis.set_major_formatter(FuncFormatter(_plain))
             axis.set_minor_locator(NullLocator())
         elif name in chart.log:
-            _logarithmic(axis, most)
+            low, high = sorted(axis.get_view_interval())
+            decades = float(np.log10(high / low))
+            if high < _SHORT * low:
+                axis.set_major_locator(MaxNLocator(min(most, 4), steps=[1, 2, 5, 10]))
+            elif decades < 2:
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+            else:
+                axis.set_major_locator(LogLocator(numticks=most + 1))
+            axis.set_minor_formatter(NullFormatter())
+            if high < _SHORT * low:
+                axis.set_minor_locator(NullLocator())
+            plain = (low >= 1e-3 and high <= 1e5) or decades < 2
+            axis.set_major_formatter(FuncFormatter(_plain) if plain else LogFormatterSciNotation())
         else:
             axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
-
-
-def _logarithmic(axis: Axis, most: int) -> None:
-    low, high = sorted(axis.get_view_interval())
-    decades = float(np.log10(high / low))
-    if high < _SHORT * low:
-        axis.set_major_locator(MaxNLocator(min(most, 4), steps=[1, 2, 5, 10]))
-    elif decades < 2:
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
-    else:
-        axis.set_major_locator(LogLocator(numticks=most + 1))
-    axis.set_minor_formatter(NullFormatter())
-    if high < _SHORT * low:
-        axis.set_minor_locator(NullLocator())
-    plain = (low >= 1e-3 and high <= 1e5) or decades < 2
-    axis.set_major_formatter(FuncFormatter(_plain) if plain else LogFormatterSciNotation())
 
 
 def _plain(value: float, _: int) -> str:

@@ -41,7 +41,8 @@ def _fill(axes: Axes, labels: Sequence[str], percent: np.ndarray) -> None:
     ticks = [*(-t for t in _decades(low)), 0.0, *_decades(high)]
     axes.set_xticks(ticks, [f"{t:+g}".replace("-", "−") if t else "0" for t in ticks])
     axes.set_ylim(len(labels) - 0.5, -0.5)
-    axes.set_yticks(rows, [_short(text) for text in labels])
+    cut = [t if len(t) <= _LONGEST else f"{t[: _LONGEST - 1]}…" for t in labels]
+    axes.set_yticks(rows, cut)
     axes.set_xlabel("change / %")
 
 
@@ -49,7 +50,3 @@ def _decades(end: float) -> list[float]:
     """Some powers of ten from the linear part to the end, at most five."""
     top = int(np.log10(end))
     return [10.0**k for k in range(0, top + 1, max(1, -(-top // 4)))]
-
-
-def _short(label: str) -> str:
-    return label if len(label) <= _LONGEST else f"{label[: _LONGEST - 1]}…"

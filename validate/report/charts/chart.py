@@ -84,7 +84,13 @@ def drawing(result: HasMethods, chart: Chart, width: float = WIDTH) -> Drawing:
     labels = panel_labels(chart)
     if labels:
         found = {name: alone(result, panel_series(chart, name, labels), name) for name in labels}
-        names = [*_common(found), *(name for name, _ in levels(chart))]
+        # A legend names all that is not the one line of its panel
+        every = [d for shown in found.values() for d in shown]
+        named = [d.series.name for d in every if d.series.label not in found or d.series.of]
+        shaded = [d.series.name for d in every if d.series.style == "band"]
+        of = {d.series.name: d.series.of for d in every if d.series.of}
+        names = [*dict.fromkeys(of.get(n, n) for n in (*named, *shaded) if n not in found)]
+        names += [name for name, _ in levels(chart)]
         below = legend_height(_broken(names, width), width) if names else 0.0
         rows = -(-len(labels) // _columns(labels))
         height = _PANEL * rows + _ROOM + below
@@ -150,15 +156,6 @@ def _broken(names: Sequence[str], width: float) -> list[str]:
 
 def _columns(labels: Sequence[str]) -> int:
     return 2 if len(labels) <= _FEW else 3
-
-
-def _common(found: Mapping[str, Sequence[Drawn]]) -> list[str]:
-    """What a legend names: all that is not the one line of its panel."""
-    drawn = [d for shown in found.values() for d in shown]
-    named = [d.series.name for d in drawn if d.series.label not in found or d.series.of]
-    shaded = [d.series.name for d in drawn if d.series.style == "band"]
-    of = {d.series.name: d.series.of for d in drawn if d.series.of}
-    return list(dict.fromkeys(of.get(n, n) for n in (*named, *shaded) if n not in found))
 
 
 def _panels(

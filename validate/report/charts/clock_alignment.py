@@ -1,9 +1,7 @@
 """Chart of two channels on one clock, for a visual check of their alignment."""
 
-import numpy as np
 from matplotlib.figure import Figure
 
-from validate.arrays import Floats
 from validate.compare.exhibit import Picture
 from validate.recording.types import Signal
 from validate.report.charts.style import WIDTH, draw, legend_below
@@ -21,15 +19,11 @@ def aligned(one: Signal, other: Signal, names: tuple[str, str], seconds: float) 
             (one, 0.0, names[0], _COLOURS[0], "-"),
             (other, seconds, names[1], _COLOURS[1], (0, (4, 2))),
         ):
-            ax.plot(signal.t + late, _even(signal.y[:, 0]), color=colour, ls=dash, lw=1.2,
-                    label=name)  # fmt: skip
+            y = signal.y[:, 0]
+            even = (y - y.mean()) / (float(y.std()) or 1.0)
+            ax.plot(signal.t + late, even, color=colour, ls=dash, lw=1.2, label=name)
         ax.set(xlabel="time / s", ylabel="minus its mean, over its sd / 1")
         legend_below(figure, ax)
 
     words = f"'{names[1]}' moved by {seconds:+.6g} s over '{names[0]}', each minus its mean."
     return Picture("aligned", words, words, draw(paint, WIDTH, _HEIGHT))
-
-
-def _even(y: Floats) -> Floats:
-    spread = float(y.std()) or 1.0
-    return np.asarray((y - y.mean()) / spread)

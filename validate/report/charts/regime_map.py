@@ -7,14 +7,13 @@ marks.
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from validate.arrays import Floats
-from validate.compare.exhibit import Mark, Panel, Picture, RegimeMap
+from validate.compare.exhibit import Mark, Picture, RegimeMap
 from validate.report.charts.style import WIDTH, draw, legend_columns, legend_height, panels
 
 _COLOURS = ("#56B4E9", "#CFE8F7", "#D55E00", "#7F7F7F")  # Okabe-Ito, the second a paler first
@@ -47,41 +46,35 @@ def picture(shown: RegimeMap) -> Picture:
 
 def _fill(figure: Figure, shown: RegimeMap, columns: int) -> None:
     axes, lowest = panels(figure, len(shown.panels), columns)
+    colours = ListedColormap(_COLOURS[: len(shown.regimes)])
+    norm = BoundaryNorm(np.arange(len(shown.regimes) + 1) - 0.5, len(shown.regimes))
+    edges, x = np.arange(len(shown.rows) + 1) - 0.5, _edges(shown.x)
     for ax, panel in zip(axes, shown.panels, strict=True):
-        _panel(ax, shown, panel)
+        ax.set_xscale("log")
+        ax.pcolormesh(x, edges, panel.codes, cmap=colours, norm=norm, edgecolors="white",
+                      linewidth=0.2)  # fmt: skip
+        # Strokes over the regimes that grey paper would not tell apart
+        for code, hatch in enumerate(_HATCHES[: len(shown.regimes)]):
+            for row, column in np.argwhere(panel.codes == code) if hatch else ():
+                ax.fill_between(x[column : column + 2], row - 0.5, row + 0.5, facecolor="none",
+                                edgecolor="#00000055", hatch=hatch, lw=0)  # fmt: skip
+        for row, at in enumerate(panel.border):
+            if np.isfinite(at) and x[0] < at < x[-1]:
+                ax.plot([at, at], [row - 0.5, row + 0.5], color=_BORDER, linewidth=1.6)
+        for i, mark in enumerate(shown.marks):
+            ax.plot(mark.x, mark.row, **_look(i, mark))
+        ax.set_title(panel.title, loc="left", fontsize=8.5)
+        ax.set(xlim=(x[0], x[-1]), ylim=(edges[0], edges[-1]))
+        ax.grid(visible=False)
+        ax.minorticks_off()
     for ax in lowest:
         ax.set_xlabel(shown.x_label)
     for ax in axes[::columns]:
         ax.set_yticks(range(len(shown.rows)), shown.rows, fontsize=8)
     figure.supylabel(shown.y_label, fontsize="medium")
-    _legend(figure, shown)
-
-
-def _panel(ax: Axes, shown: RegimeMap, panel: Panel) -> None:
-    colours = ListedColormap(_COLOURS[: len(shown.regimes)])
-    norm = BoundaryNorm(np.arange(len(shown.regimes) + 1) - 0.5, len(shown.regimes))
-    edges = np.arange(len(shown.rows) + 1) - 0.5
-    ax.set_xscale("log")
-    ax.pcolormesh(
-        _edges(shown.x), edges, panel.codes, cmap=colours, norm=norm,
-        edgecolors="white", linewidth=0.2,
-    )  # fmt: skip
-    # Strokes over the regimes that grey paper would not tell apart
-    x = _edges(shown.x)
-    for code, hatch in enumerate(_HATCHES[: len(shown.regimes)]):
-        for row, column in np.argwhere(panel.codes == code) if hatch else ():
-            ax.fill_between(x[column : column + 2], row - 0.5, row + 0.5, facecolor="none",
-                            edgecolor="#00000055", hatch=hatch, lw=0)  # fmt: skip
-    span = _edges(shown.x)[[0, -1]]
-    for row, at in enumerate(panel.border):
-        if np.isfinite(at) and span[0] < at < span[1]:
-            ax.plot([at, at], [row - 0.5, row + 0.5], color=_BORDER, linewidth=1.6)
-    for i, mark in enumerate(shown.marks):
-        ax.plot(mark.x, mark.row, **_look(i, mark))
-    ax.set_title(panel.title, loc="left", fontsize=8.5)
-    ax.set(xlim=tuple(span), ylim=(edges[0], edges[-1]))
-    ax.grid(visible=False)
-    ax.minorticks_off()
+    entries = _entries(shown)
+    count = legend_columns([str(e.get_label()) for e in entries])
+    figure.legend(handles=entries, loc="outside lower center", ncols=count)
 
 
 def _look(i: int, mark: Mark) -> dict[str, Any]:
@@ -108,9 +101,3 @@ def _entries(shown: RegimeMap) -> list[Patch | Line2D]:
     for i, mark in enumerate(shown.marks):
         entries.append(Line2D([], [], label=mark.label, **_look(i, mark)))
     return entries
-
-
-def _legend(figure: Figure, shown: RegimeMap) -> None:
-    entries = _entries(shown)
-    columns = legend_columns([str(e.get_label()) for e in entries])
-    figure.legend(handles=entries, loc="outside lower center", ncols=columns)

@@ -117,7 +117,8 @@ def free_look(i: int, colour: str) -> Style:
 
 def draw(paint: Callable[[Figure], None], width: float, height: float, dpi: float = DPI) -> Pixels:
     """Pixels (h, w, 3) of a figure of width x height inches that `paint` fills."""
-    return _pixels(painted(paint, width, height, dpi).canvas)
+    canvas: Any = painted(paint, width, height, dpi).canvas
+    return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
 
 
 def drawn_picture(
@@ -186,10 +187,6 @@ def legend_height(labels: Sequence[str], width: float = WIDTH) -> float:
     """Inches that the legend takes."""
     lines = max(len(label.splitlines()) for label in labels)
     return 0.21 * lines * -(-len(labels) // legend_columns(labels, width)) + 0.1
-
-
-def _pixels(canvas: Any) -> Pixels:
-    return np.array(canvas.buffer_rgba(), dtype=np.uint8)[..., :3].copy()
 
 
 # --- encoding of figures: PNG files, and smaller WebP data URIs for the page ---------------------

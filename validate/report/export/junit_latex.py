@@ -46,24 +46,19 @@ def junit(content: Json) -> str:
     suites += [
         (f"{name}.published", [_figure(p) for p in content["published"] if p.get("result", True)])
     ]
-    for suite, cases in suites:
+    for title, cases in suites:
         if cases:
-            _suite(root, suite, cases, content["created"])
+            suite = ElementTree.SubElement(
+                root, "testsuite", name=title, timestamp=content["created"]
+            )
+            counts = {key: sum(case.find(tag) is not None for case in cases)
+                      for key, tag in _COUNTED.items() if tag}  # fmt: skip
+            suite.attrib.update({k: str(n) for k, n in {"tests": len(cases), **counts}.items()})
+            suite.extend(cases)
     for key in _COUNTED:
         root.set(key, str(sum(int(suite.get(key, 0)) for suite in root)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _suite(
-    root: ElementTree.Element, name: str, cases: list[ElementTree.Element], created: str
-) -> None:
-    counts = {key: sum(case.find(tag) is not None for case in cases)
-              for key, tag in _COUNTED.items() if tag}  # fmt: skip
-    told = {"tests": len(cases), **counts}
-    suite = ElementTree.SubElement(root, "testsuite", name=name, timestamp=created)
-    suite.attrib.update({key: str(value) for key, value in told.items()})
-    suite.extend(cases)
 
 
 def _cases(content: Json, method: Json) -> list[ElementTree.Element]:

@@ -6,9 +6,8 @@ from types import NoneType
 from typing import Any, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
-from validate.compare.row import Label, LongRow, Wanted, selects
+from validate.compare.row import LongRow, Wanted, selects
 from validate.errors import UsageError
 from validate.installation import install_command
 
@@ -26,7 +25,8 @@ def parquet_bytes(head: str, groups: Sequence[Sequence[LongRow]]) -> bytes:
     import pyarrow.parquet as pq
 
     out = pa.BufferOutputStream()
-    schema = _schema(pa)
+    types = {str: pa.string(), float: pa.float64(), int: pa.int64()}
+    schema = pa.schema([(name, types[kind]) for name, kind in column_types().items()])
     # The schema's copy in Arrow's own form is of no use to other readers.
     with pq.ParquetWriter(out, schema, compression="zstd", store_schema=False) as writer:
         writer.add_key_value_metadata({HEAD: head.encode()})
@@ -49,32 +49,25 @@ def parquet_head(data: bytes) -> str:
 def parquet_rows(data: bytes, labels: Mapping[str, Wanted]) -> list[LongRow]:
     """Return the rows whose columns fit; row groups without any are not decoded as a whole."""
     file, rows = _opened(data), []
+    import pyarrow as pa
+
     for i in range(file.num_row_groups):
         kept = np.ones(file.metadata.row_group(i).num_rows, dtype=bool)
         for name, wanted in labels.items():
             if kept.any():
                 column = file.read_row_group(i, columns=[name], use_threads=False).column(0)
-                kept &= _fitting(column.to_pylist(), wanted)
+                values = column.to_pylist()
+                fits = selects(wanted)
+                known = {value: fits(value) for value in set(values)}
+                kept &= np.array([known[value] for value in values], dtype=bool)
         if kept.any():
             found = file.read_row_group(i, columns=list(LongRow._fields), use_threads=False)
-            found = found.filter(_mask(kept))
+            # The mask as pyarrow has it, by its bits: `pyarrow.array` would import pandas (42 MB)
+            bits = pa.py_buffer(np.packbits(kept, bitorder="little"))
+            found = found.filter(pa.Array.from_buffers(pa.bool_(), len(kept), [None, bits]))
             columns = [found.column(name).to_pylist() for name in LongRow._fields]
             rows += [LongRow(*row) for row in zip(*columns, strict=True)]
     return rows
-
-
-def _fitting(values: Sequence[Label], wanted: Wanted) -> NDArray[np.bool_]:
-    fits = selects(wanted)
-    known = {value: fits(value) for value in set(values)}
-    return np.array([known[value] for value in values], dtype=bool)
-
-
-def _mask(kept: NDArray[np.bool_]) -> Any:
-    """The mask as pyarrow has it, by its bits: `pyarrow.array` would import pandas (42 MB)."""
-    import pyarrow as pa
-
-    bits = pa.py_buffer(np.packbits(kept, bitorder="little"))
-    return pa.Array.from_buffers(pa.bool_(), len(kept), [None, bits])
 
 
 def _opened(data: bytes) -> Any:
@@ -90,11 +83,6 @@ def _opened(data: bytes) -> Any:
         return pq.ParquetFile(pa.BufferReader(data))
     except (pa.ArrowException, OSError) as error:
         raise ValueError(f"no Parquet file: {error!s:.80}") from None
-
-
-def _schema(pa: Any) -> Any:
-    types = {str: pa.string(), float: pa.float64(), int: pa.int64()}
-    return pa.schema([(name, types[kind]) for name, kind in column_types().items()])
 
 
 def column_types() -> dict[str, type]:

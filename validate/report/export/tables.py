@@ -17,16 +17,14 @@ _SIGNS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
 def shown(entry: Entry | TableCell) -> str:
     """Return an entry as read: three significant digits, whole numbers whole, a dash for None."""
     if isinstance(entry, TableCell):
-        return _SIGNS.get(entry.emphasis, "") + (entry.text or _measured(entry.value, entry.unit))
+        value, unit = entry.value, entry.unit
+        words = text(value, unit) if unit and isinstance(value, float) else shown(value)
+        return _SIGNS.get(entry.emphasis, "") + (entry.text or words)
     if entry is None:
         return MISSING
     if isinstance(entry, str):
         return entry
     return text(float(entry)) if isinstance(entry, int) else significant(entry)
-
-
-def _measured(value: Entry, unit: str) -> str:
-    return text(value, unit) if unit and isinstance(value, float) else shown(value)
 
 
 def unit_cell(unit: str) -> TableCell:

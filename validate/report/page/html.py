@@ -14,14 +14,13 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined, Template
 from markupsafe import Markup
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.compare.exhibit import (
     Chart,
     Entry,
     ImageSeries,
     Intervals,
     Picture,
-    Series,
     TableCell,
     plain,
 )
@@ -294,15 +293,36 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
     apart = len({d.series.name for d in drawable}) <= _NAMES
     for drawn in drawable:
         of, jagged = drawn.series.label, is_jagged(drawn.series) and not drawn.one_of
+        dash = "-" if jagged else drawn.look.dash
         look = {"label": drawn.series.name if apart else of, "colour": drawn.look.colour,
-                "dash": [] if jagged else _dash(drawn.look.dash),
+                "dash": [] if dash == "-" else [3 * float(length) for length in dash[1]],
                 "width": 0.9 if jagged else drawn.look.width or 1.0,
                 "hidden": of in later or bool(band_of(drawn.series, later))}  # fmt: skip
-        style, ways = drawn.series.style, [np.argsort(drawn.series.x, kind="stable")]
-        if style == "line" and len(found := _ways(drawn.series.x)) > 1:
-            style, ways = ("line", found) if len(found) <= _WAYS else ("points", ways)
+        style, across = drawn.series.style, drawn.series.x
+        ways = [np.argsort(across, kind="stable")]
+        if style == "line":  # parts between its turns, each in rising x; neighbours share ends
+            sense = np.sign(np.diff(across))
+            moving = np.flatnonzero(sense)
+            turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
+            ends = [0, *turns.tolist(), len(across) - 1]
+            parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+            if len(parts) > _WAYS:
+                style = "points"
+            elif len(parts) > 1:
+                ways = [part[np.argsort(across[part], kind="stable")] for part in parts]
+        given = {"y": drawn.series.y}
+        given |= {} if drawn.series.upper is None else {"upper": drawn.series.upper}
         for way in ways:
-            x, columns = _points(drawn.series, way, least)
+            keep = way
+            if len(way) > _MOST:  # the lowest and the highest of equal parts, and both ends
+                y = drawn.series.y[way]
+                parts = np.array_split(np.arange(len(y)), _MOST // 2)
+                peaks = [i for p in parts for i in (p[y[p].argmin()], p[y[p].argmax()])]
+                keep = way[np.unique([0, *peaks, len(y) - 1])]
+            x, columns = _numbers(across[keep]), {}
+            for name, values in given.items():
+                above = np.where(least and values[keep] < least, np.nan, values[keep])
+                columns[name] = _numbers(above, _SHOWN)
             if x not in xs:
                 xs.append(x)
             series.append({**look, "style": style, "x": xs.index(x), **columns})
@@ -311,41 +331,6 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
         "series": series,
         "levels": [{"label": name, "y": _number(y)} for name, y in levels(chart)],
     }  # fmt: skip
-
-
-def _dash(given: Any) -> list[float]:
-    return [] if given == "-" else [3 * float(length) for length in given[1]]
-
-
-def _ways(x: Floats) -> list[Ints]:
-    """Indices of the parts of x (k,) between its turns, each in rising x; neighbours share ends."""
-    sense = np.sign(np.diff(x))
-    moving = np.flatnonzero(sense)
-    turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
-    ends = [0, *turns.tolist(), len(x) - 1]
-    parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
-    return [part[np.argsort(x[part], kind="stable")] for part in parts]
-
-
-def _points(
-    series: Series, order: Ints, least: float
-) -> tuple[list[float | None], dict[str, list[float | None]]]:
-    keep = order[_peaks(series.y[order])]
-    columns = {"y": series.y} | ({} if series.upper is None else {"upper": series.upper})
-    found = {
-        name: _numbers(np.where(least and y[keep] < least, np.nan, y[keep]), _SHOWN)
-        for name, y in columns.items()
-    }
-    return _numbers(series.x[keep]), found
-
-
-def _peaks(y: Floats) -> Ints:
-    """Indices of the lowest and the highest of equal parts of y (k,), and of both ends."""
-    if len(y) <= _MOST:
-        return np.arange(len(y))
-    parts = np.array_split(np.arange(len(y)), _MOST // 2)
-    found = [i for part in parts for i in (part[y[part].argmin()], part[y[part].argmax()])]
-    return np.unique([0, *found, len(y) - 1])
 
 
 def _numbers(values: Floats, digits: int = _DIGITS) -> list[float | None]:

@@ -78,19 +78,14 @@ def _colour(r: float, g: float, b: float, a: float) -> Color:
 
 def frame_transforms(ns: int, parent: str, children: Sequence[tuple[str, Floats]]) -> bytes:
     """`children`: frame name and T_parent_from_child (4, 4), a proper rotation and shift m."""
-    transforms = [_transform(ns, parent, *child) for child in children]
+    transforms = []
+    for child, pose in children:
+        x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
+        transforms.append(FrameTransform(
+            timestamp=_time(ns), parent_frame_id=parent, child_frame_id=child,
+            translation=_vector(pose[:3, 3]), rotation=Quaternion(x=x, y=y, z=z, w=w),
+        ))  # fmt: skip
     return _encoded(FrameTransforms(transforms=transforms))
-
-
-def _transform(ns: int, parent: str, child: str, pose: Floats) -> FrameTransform:
-    x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat().tolist()
-    return FrameTransform(
-        timestamp=_time(ns),
-        parent_frame_id=parent,
-        child_frame_id=child,
-        translation=_vector(pose[:3, 3]),
-        rotation=Quaternion(x=x, y=y, z=z, w=w),
-    )
 
 
 def picture(ns: int, frame: str, png: bytes) -> bytes:

@@ -31,13 +31,12 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.compare.result import MethodResult, Result
 from validate.recording.mcap.protobuf_messages import protobuf_schema
 from validate.recording.mcap.schemas import CONTOUR, MARKERS, SIGNAL, Json
 from validate.recording.mcap.write import WrittenChannel, WrittenMessage, write_channels
 from validate.report.replay import foxglove
-from validate.report.replay.foxglove import CLOUD, IMAGE, SCENE, Rgba
+from validate.report.replay.foxglove import CLOUD, IMAGE, SCENE
 from validate.report.replay.space import (
     COLOURS,
     images,
@@ -65,12 +64,37 @@ def write_replay(result: Result, path: Path) -> None:
 
     Without recordings it holds metadata only, and has no layout.
     """
+    inputs = {
+        INPUT + (prefix[1:] or r.name): {
+            "path": file_name(r.source.path),
+            "sha256": r.source.sha256,
+            "bytes": str(r.source.bytes),
+            "integrity": r.source.integrity,
+        }
+        for r, prefix in zip(result.recordings, _prefixes(result), strict=True)
+    }
+    method = shown_method(result)
+    frames_alone = any(over_time(view) for view in views(result))
+    record = {
+        "format": "1",
+        "experiment": result.name,
+        "method": method.name if method else "",
+        "method_label": method.label if method else "",
+        "quick": "yes" if result.quick else "no",
+        "kind": result.kind,
+        "interpolated": "nothing: output frames keep their times" if frames_alone
+                        else f".../simulated/scene and points: {HOW}",
+    }  # fmt: skip
     coarse = 1
     while True:
         shown = [(view, tracks(view)) for view in views(result, coarse)]
         found = tuple(t for _, tracks in shown for t in tracks)
         channels = [WrittenChannel(t.topic, _ALL[t.schema]) for t in found]
-        metadata = {RECORD: _record(result, found, coarse), **_inputs(result)}
+        thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
+        thinned += [f"interpolated instants: one in {coarse}"] if coarse > 1 else []
+        record["thinned"] = "; ".join(thinned) or "nothing"
+        record["left_out"] = "; ".join(_left_out(result, method, found)) or "nothing"
+        metadata = {RECORD: record, **inputs}
         metadata |= {name: values for t in found for name, values in t.records}
         write_channels(path, channels, _in_time(found), metadata)
         if path.stat().st_size <= MAX_BYTES or coarse >= _COARSEST:
@@ -110,12 +134,11 @@ def tracks(view: ReplayView) -> tuple[Track, ...]:
         *markers(view),
         *surface(view),
     ]
-    return tuple(t for t in (*transforms(view, found), *found) if not _too_late(t))
-
-
-def _too_late(track: Track) -> bool:
-    """Foxglove's stamps end in 2106; ours do not."""
-    return track.schema in foxglove.SCHEMAS and int(track.ns[-1]) > foxglove.LAST_NS
+    every = (*transforms(view, found), *found)
+    # Foxglove's stamps end in 2106; ours do not
+    return tuple(
+        t for t in every if t.schema not in foxglove.SCHEMAS or int(t.ns[-1]) <= foxglove.LAST_NS
+    )
 
 
 def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
@@ -128,30 +151,6 @@ def _in_time(found: Sequence[Track]) -> Iterator[WrittenMessage]:
     for k in np.argsort(ns, kind="stable"):
         track = found[which[k]]
         yield WrittenMessage(track.topic, int(ns[k]), track.message(int(number[k])))
-
-
-def _record(result: Result, found: Sequence[Track], coarse: int) -> dict[str, str]:
-    method = shown_method(result)
-    thinned = [f"{t.topic}: {t.note}" for t in found if t.note]
-    if coarse > 1:
-        thinned.append(f"interpolated instants: one in {coarse}")
-    return {
-        "format": "1",
-        "experiment": result.name,
-        "method": method.name if method else "",
-        "method_label": method.label if method else "",
-        "quick": "yes" if result.quick else "no",
-        "kind": result.kind,
-        "interpolated": _interpolated(result),
-        "thinned": "; ".join(thinned) or "nothing",
-        "left_out": "; ".join(_left_out(result, method, found)) or "nothing",
-    }
-
-
-def _interpolated(result: Result) -> str:
-    if any(over_time(view) for view in views(result)):
-        return "nothing: output frames keep their times"
-    return f".../simulated/scene and points: {HOW}"
 
 
 def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track]) -> Iterator[str]:
@@ -170,19 +169,6 @@ def _left_out(result: Result, method: MethodResult | None, found: Sequence[Track
         yield "all but numbers: Foxglove's stamps end in 2106"
     if method.scene.mesh.dimension != 3:
         yield "surface: the mesh is planar"
-
-
-def _inputs(result: Result) -> dict[str, dict[str, str]]:
-    prefixes = _prefixes(result) if result.recordings else []
-    return {
-        INPUT + (prefix[1:] or r.name): {
-            "path": file_name(r.source.path),
-            "sha256": r.source.sha256,
-            "bytes": str(r.source.bytes),
-            "integrity": r.source.integrity,
-        }
-        for r, prefix in zip(result.recordings, prefixes, strict=True)
-    }
 
 
 # --- replay.layout.json: panels of a replay for Foxglove or Lichtblick ---------------------------
@@ -221,11 +207,32 @@ def _add(panels: dict[str, Json], kind: str, config: Json) -> str:
 
 def _recording(view: ReplayView, tracks: Sequence[Track], panels: dict[str, Json]) -> Json | str:
     """The split of one recording's panels, which are added to `panels`."""
-    beside = [_add(panels, "Image", _image(t)) for t in tracks if t.schema == IMAGE]
+    beside = [
+        _add(panels, "Image", {"imageMode": {"imageTopic": t.topic}, "foxglovePanelTitle": t.topic})
+        for t in tracks if t.schema == IMAGE
+    ]  # fmt: skip
     beside += [_add(panels, "Plot", plot) for plot in _plots(tracks)]
     if not any(t.schema == SCENE for t in tracks):
         return _column(beside)
-    space = _add(panels, "3D", _space(view, tracks))
+    # The panel of what lies in space: scenes shown, the same as points hidden
+    centre, size = np.zeros(3), _SIZE
+    if view.method is not None:
+        nodes = view.method.scene.mesh.nodes
+        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        centre[: len(low)] = (low + high) / 2
+        size = float((high - low).max()) or _SIZE
+    camera = {
+        "perspective": True, "distance": _FAR * size, "phi": 60.0, "thetaOffset": 45.0,
+        "target": centre.tolist(), "targetOffset": [0.0, 0.0, 0.0],
+        "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": size / 100,
+        "far": 100 * size,
+    }  # fmt: skip
+    topics = {t.topic: {"visible": t.schema == SCENE} for t in tracks if t.schema in (SCENE, CLOUD)}
+    space = _add(panels, "3D", {
+        "cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
+        "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
+        "layers": {}, "foxglovePanelTitle": _title(view),
+    })  # fmt: skip
     if not beside:
         return space
     return {"first": space, "second": _column(beside), "direction": "row",
@@ -239,10 +246,6 @@ def _column(panels: Sequence[str]) -> Json | str:
         return first
     return {"first": first, "second": _column(rest), "direction": "column",
             "splitPercentage": 100 / len(panels)}  # fmt: skip
-
-
-def _image(track: Track) -> Json:
-    return {"imageMode": {"imageTopic": track.topic}, "foxglovePanelTitle": track.topic}
 
 
 def _plots(tracks: Iterable[Track]) -> Iterable[Json]:
@@ -263,38 +266,9 @@ def _plots(tracks: Iterable[Track]) -> Iterable[Json]:
 
 def _paths(track: Track) -> Iterable[Json]:
     who = track.topic.rpartition("/")[2]
-    colour = COLOURS["simulated" if who == "simulated" else "measured"]
+    rgba = COLOURS["simulated" if who == "simulated" else "measured"]
+    colour = "#" + "".join(f"{round(255 * part):02x}" for part in (rgba.r, rgba.g, rgba.b))
     for part in range(track.width):
         label = who if track.width == 1 else f"{who} {part}"
         yield {"value": f"{track.topic}.values[{part}]", "enabled": True, "label": label,
-               "timestampMethod": "receiveTime", "color": _hex(colour)}  # fmt: skip
-
-
-def _hex(colour: Rgba) -> str:
-    return "#" + "".join(f"{round(255 * part):02x}" for part in (colour.r, colour.g, colour.b))
-
-
-def _space(view: ReplayView, tracks: Sequence[Track]) -> Json:
-    """The panel of what lies in space: scenes shown, the same as points hidden."""
-    centre, size = _body(view)
-    camera = {
-        "perspective": True, "distance": _FAR * size, "phi": 60.0, "thetaOffset": 45.0,
-        "target": centre.tolist(), "targetOffset": [0.0, 0.0, 0.0],
-        "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": size / 100,
-        "far": 100 * size,
-    }  # fmt: skip
-    topics = {t.topic: {"visible": t.schema == SCENE} for t in tracks if t.schema in (SCENE, CLOUD)}
-    return {"cameraState": camera, "followMode": "follow-none", "followTf": view.frame,
-            "fixedFrame": view.frame, "scene": {}, "transforms": {}, "topics": topics,
-            "layers": {}, "foxglovePanelTitle": _title(view)}  # fmt: skip
-
-
-def _body(view: ReplayView) -> tuple[Floats, float]:
-    """Centre m (3,) and size m of the body; the origin where no method has one."""
-    if view.method is None:
-        return np.zeros(3), _SIZE
-    nodes = view.method.scene.mesh.nodes
-    low, high = nodes.min(axis=0), nodes.max(axis=0)
-    centre = np.zeros(3)
-    centre[: len(low)] = (low + high) / 2
-    return centre, float((high - low).max()) or _SIZE
+               "timestampMethod": "receiveTime", "color": colour}  # fmt: skip

@@ -5,7 +5,7 @@ and at the loads; `.../scene` and `.../points` are to look at and add interpolat
 same as lines, spheres and a surface, and as points for viewers that draw no scenes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
@@ -31,7 +31,7 @@ from validate.recording.types import Frames, Markers
 from validate.report.replay import foxglove
 from validate.report.replay.foxglove import CLOUD, IMAGE, SCENE, TRANSFORMS, Entity, Rgba, picture
 from validate.report.replay.view import ReplayView, Track, load_of, pose_records
-from validate.report.scenes.body import OUTSIDE, SurfacePart, skins
+from validate.report.scenes.body import OUTSIDE, skins
 from validate.report.sections import observations
 from validate.report.sections.observations import holds
 from validate.report.sections.observations import signals as scalar_signals
@@ -226,19 +226,17 @@ def surface(view: ReplayView) -> list[Track]:
         u = moving[i].u[shown]
         return foxglove.cloud(ns, view.frame, scene.mesh.nodes[shown] + u, _shades(u, top))
 
-    note, t = ", ".join(_left_out(parts, len(moving), len(view.held()))), [i.t for i in moving]
+    left_out = []
+    drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
+    if drawn < whole:
+        left_out.append(f"{drawn} of {whole} triangles")
+    if len(moving) < (frames := len(view.held())):
+        left_out.append(f"{len(moving)} of {frames} output frames")
+    note, t = ", ".join(left_out), [i.t for i in moving]
     return [
         view.track("/surface/simulated/scene", SCENE, t, scenes, note),
         view.track("/surface/simulated/points", CLOUD, t, points, note),
     ]
-
-
-def _left_out(parts: Sequence[SurfacePart], shown: int, frames: int) -> Iterator[str]:
-    drawn, whole = sum(len(p.triangles) for p in parts), sum(p.whole for p in parts)
-    if drawn < whole:
-        yield f"{drawn} of {whole} triangles"
-    if shown < frames:
-        yield f"{shown} of {frames} output frames"
 
 
 def _shades(u: Floats, top: float, part: str = "") -> Floats:

@@ -116,23 +116,22 @@ def _plates(method: MethodResult, scene: Scene, frames: Ints) -> Iterator[Tool]:
     axis = int(np.argmax(np.abs(drive.direction)))
     moved = _MM * np.outer(travelled.y[method.run.at[frames]], drive.direction)
     held = [s.facets for s in scene.supports if axis in s.components]
+    across = scene.mesh.nodes[:, axis]
+    middle = 0.5 * _MM * (across.min() + across.max())
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
     for name in dict.fromkeys([drive.facets, *held]):
         nodes = _MM * scene.mesh.nodes[nodes_of(scene.mesh, name)]
         low, high = nodes.min(axis=0), nodes.max(axis=0)
-        if high[axis] - low[axis] < 1e-6:
-            yield _plate(low, high, axis, scene.mesh, moved if name == drive.facets else 0 * moved)
-
-
-def _plate(low: Floats, high: Floats, axis: int, mesh: Mesh, shifts: Floats) -> Tool:
-    """A box outside the body on the flat face from `low` to `high` (3,) mm across `axis`."""
-    middle = 0.5 * _MM * (mesh.nodes[:, axis].min() + mesh.nodes[:, axis].max())
-    sizes = (high - low) * 1.12
-    thick = 0.04 * float((high - low).max())
-    sizes[axis] = thick
-    centre = 0.5 * (low + high)
-    centre[axis] += 0.55 * thick * np.sign(low[axis] - middle)
-    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-    return Tool(centre + 0.5 * sizes * corners, np.array(_BOX), shifts, plate=True)
+        if high[axis] - low[axis] >= 1e-6:
+            continue
+        # A box outside the body on the flat face
+        sizes = (high - low) * 1.12
+        thick = 0.04 * float((high - low).max())
+        sizes[axis] = thick
+        centre = 0.5 * (low + high)
+        centre[axis] += 0.55 * thick * np.sign(low[axis] - middle)
+        shifts = moved if name == drive.facets else 0 * moved
+        yield Tool(centre + 0.5 * sizes * corners, np.array(_BOX), shifts, plate=True)
 
 
 _BOX = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6],
@@ -245,38 +244,29 @@ def flat_triangles(facets: Ints) -> Ints:
 
 
 def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> SurfacePart:
-    drawn = triangles if share >= 1 else _thinned(mesh.nodes, triangles, share)
-    nodes, local = np.unique(drawn, return_inverse=True)
-    return SurfacePart(name, nodes, local.reshape(-1, 3), len(triangles))
-
-
-def _thinned(nodes: Floats, triangles: Ints, share: float) -> Ints:
     """Triangles between fewer nodes: `share` of them at most, unless under `_FEWEST` are left."""
-    corners = nodes[triangles]
+    corners = mesh.nodes[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1).sum()
     size = float(np.sqrt(2 * area / len(triangles)))  # the legs of an average triangle
+    used = np.unique(triangles)
+    x, corner = mesh.nodes[used], np.searchsorted(used, triangles)
     kept = triangles
     while len(kept) > share * len(triangles):
-        joined = _joined(nodes, triangles, size)
-        if len(joined) < _FEWEST:
-            return kept
-        kept, size = joined, 1.2 * size
-    return kept
-
-
-def _joined(nodes: Floats, triangles: Ints, size: float) -> Ints:
-    used = np.unique(triangles)
-    box = np.floor((nodes[used] - nodes[used].min(axis=0)) / size).astype(np.int64)
-    _, cluster = np.unique(box, axis=0, return_inverse=True)
-    cluster = cluster.ravel()
-    count = np.bincount(cluster)
-    mean = np.stack([np.bincount(cluster, x) / count for x in nodes[used].T], axis=1)
-    off = np.linalg.norm(nodes[used] - mean[cluster], axis=1)
-    order = np.lexsort((off, cluster))
-    first = order[np.searchsorted(cluster[order], np.arange(len(count)))]
-    moved = used[first][cluster][np.searchsorted(used, triangles)]
-    a, b, c = moved.T
-    kept = moved[(a != b) & (b != c) & (a != c)]
-    _, unique = np.unique(np.sort(kept, axis=1), axis=0, return_index=True)
-    return np.asarray(kept[np.sort(unique)])
+        # The nodes in a box of this size become the one nearest to their mean
+        box = np.floor((x - x.min(axis=0)) / size).astype(np.int64)
+        _, cluster = np.unique(box, axis=0, return_inverse=True)
+        cluster = cluster.ravel()
+        count = np.bincount(cluster)
+        mean = np.stack([np.bincount(cluster, c) / count for c in x.T], axis=1)
+        order = np.lexsort((np.linalg.norm(x - mean[cluster], axis=1), cluster))
+        first = order[np.searchsorted(cluster[order], np.arange(len(count)))]
+        moved = used[first][cluster][corner]
+        a, b, c = moved.T
+        joined = moved[(a != b) & (b != c) & (a != c)]
+        _, unique = np.unique(np.sort(joined, axis=1), axis=0, return_index=True)
+        if len(unique) < _FEWEST:
+            break
+        kept, size = np.asarray(joined[np.sort(unique)]), 1.2 * size
+    nodes, local = np.unique(kept, return_inverse=True)
+    return SurfacePart(name, nodes, local.reshape(-1, 3), len(triangles))

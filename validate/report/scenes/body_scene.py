@@ -145,7 +145,26 @@ def body_scene(result: Result, most: int) -> BodyScene | None:
         return None
     first, scene = methods[0], methods[0].scene
     names = {m.name for m in methods}
-    labels, t, numbers = _instants(first, most)
+    # Labels and times of the output frames, loads by their names; of at most so many of them the
+    # first, the last and evenly, with the one of the largest displacement
+    run = first.run
+    times = run.t[run.at]
+    labels = [f"t = {significant(at)} s" for at in times.tolist()]
+    if first.registered and first.registered[0].drives:
+        unit, moved = drive(first.registered[0]).unit, driven(first.registered[0], times)
+        driven_by = [with_unit(q, unit) for q in moved.tolist()]
+        labels = [f"{q}, {at}" for q, at in zip(driven_by, labels, strict=True)]
+    if first.registered:
+        for i, instant in enumerate(held(first.registered[0], run)):
+            if instant.hold is not None:
+                times[i], labels[i] = instant.t, spaced(instant.hold.label)
+    numbers = np.unique(np.linspace(0, len(run.u) - 1, min(len(run.u), most)).round().astype(int))
+    largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
+    if largest not in numbers:
+        nearest = 1 + int(np.abs(numbers[1:-1] - largest).argmin()) if len(numbers) > 2 else -1
+        numbers[nearest] = largest
+        numbers = np.unique(numbers)
+    t = times[numbers]
     toward = drive_direction(scene)
     shown = tuple(_shown(m, t, numbers) for m in methods)
     tools, cut = tools_of(first, numbers), None
@@ -161,39 +180,24 @@ def body_scene(result: Result, most: int) -> BodyScene | None:
         *(tool.nodes for tool in tools if tool.plate),
     ]  # fmt: skip
     flat, normal_ = scene.mesh.dimension == 2, cut.normal if cut else None
+    view = camera(np.vstack(held_by_camera), three(toward), normal_, flat)
     return BodyScene(
-        labels, t, shown, tools, camera(np.vstack(held_by_camera), three(toward), normal_, flat),
-        cut, float(np.linalg.norm(np.ptp(shown[0].nodes, axis=0))), flat,
+        tuple(labels[i] for i in numbers), t, shown, tools, view, cut,
+        float(np.linalg.norm(np.ptp(shown[0].nodes, axis=0))), flat,
         f"One of {scene.copies} symmetric parts is drawn." if scene.copies > 1 else "",
         tuple(m.label for m in _bodies(result) if m.name not in names),
     )  # fmt: skip
 
 
-def _instants(method: MethodResult, most: int) -> tuple[tuple[str, ...], Floats, Ints]:
-    """Labels, times s and numbers of at most so many output frames: first, last and evenly, with
-    the one of the largest displacement; loads by their names."""
-    run = method.run
-    times = run.t[run.at]
-    labels = [f"t = {significant(t)} s" for t in times.tolist()]
-    if method.registered and method.registered[0].drives:
-        unit, moved = drive(method.registered[0]).unit, driven(method.registered[0], times)
-        labels = [f"{with_unit(q, unit)}, {t}" for q, t in zip(moved.tolist(), labels, strict=True)]
-    if method.registered:
-        for i, instant in enumerate(held(method.registered[0], run)):
-            if instant.hold is not None:
-                times[i], labels[i] = instant.t, spaced(instant.hold.label)
-    chosen = np.unique(np.linspace(0, len(run.u) - 1, min(len(run.u), most)).round().astype(int))
-    largest = int(np.argmax(np.abs(run.u).max(axis=(1, 2))))
-    if largest not in chosen:
-        chosen[1 + int(np.abs(chosen[1:-1] - largest).argmin()) if len(chosen) > 2 else -1] = (
-            largest
-        )
-        chosen = np.unique(chosen)
-    return tuple(labels[i] for i in chosen), times[chosen], chosen
-
-
 def _shown(method: MethodResult, t: Floats, numbers: Ints) -> ShownMethod:
-    scene, run, own = method.scene, method.run, _own_frames(method, t, numbers)
+    scene, run = method.scene, method.run
+    # Its output frames nearest to the instants shown: those of the same loads where it has them
+    times = run.t[run.at]
+    own = np.array([int(np.abs(times - at).argmin()) for at in t])
+    if len(run.u) > numbers.max() and method.registered:
+        instants = held(method.registered[0], run)
+        if instants and instants[0].hold is not None:
+            own = numbers
     seen, markers = markers_seen(method), None
     if seen is not None and seen.x.shape[2] == scene.mesh.dimension:
         flat, _ = interpolated(seen.t, seen.x.reshape(len(seen.t), -1), t)
@@ -231,17 +235,6 @@ def _particles(found: Sequence[DisplacementObservation], u: Floats) -> SeenMarke
     every = slice(None, None, -(-len(rest) // _PARTICLES))
     rest, measured, simulated = (_MM * three(x[every]) for x in (rest, measured, simulated))
     return SeenMarkers(tuple(names[every]), rest, measured[None], simulated[None], inside=True)
-
-
-def _own_frames(method: MethodResult, t: Floats, numbers: Ints) -> Ints:
-    """The numbers of the method's output frames nearest to the instants shown."""
-    run = method.run
-    if len(run.u) > numbers.max() and method.registered:
-        instants = held(method.registered[0], run)
-        if instants and instants[0].hold is not None:
-            return numbers
-    times = run.t[run.at]
-    return np.array([int(np.abs(times - at).argmin()) for at in t])
 
 
 def fields(methods: Sequence[ShownMethod], at: Sequence[int]) -> list[Mapping[str, Floats]]:
@@ -336,9 +329,6 @@ def at_times(registered: Registered, run: Run, times: Floats) -> tuple[Instant, 
 def _between(a: Instant, b: Instant, t: float, q: float) -> Instant:
     way = b.drive - a.drive
     share = (q - a.drive) / way if way else 0.0
-    return _mixed(a, b, float(np.clip(share, 0.0, 1.0)), t)
-
-
-def _mixed(a: Instant, b: Instant, share: float, t: float) -> Instant:
-    q = a.drive + share * (b.drive - a.drive)
+    share = float(np.clip(share, 0.0, 1.0))
+    q = a.drive + share * way
     return Instant(t, q, a.unit, a.u + share * (b.u - a.u), None, computed=False)

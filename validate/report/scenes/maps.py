@@ -34,17 +34,18 @@ def legible(maps: Iterable[NodeMap]) -> tuple[NodeMap, ...]:
     largest: dict[str, float] = {}
     for m in shown:
         largest[m.scale] = max(largest.get(m.scale, 0.0), _top(m))
-    return tuple(_own(m) if m.scale and _top(m) < _FAINT * largest[m.scale] else m for m in shown)
+    found = []
+    for m in shown:
+        if m.scale and _top(m) < _FAINT * largest[m.scale]:
+            far = f"separate colour scale, far below the largest of {m.scale}"
+            found.append(replace(m, title=f"{m.title.removesuffix('.')} ({far})", scale=""))
+        else:
+            found.append(m)
+    return tuple(found)
 
 
 def _top(shown: NodeMap) -> float:
     return float(np.abs(values(shown)).max())
-
-
-def _own(shown: NodeMap) -> NodeMap:
-    title = shown.title.removesuffix(".")
-    words = f"{title} (separate colour scale, far below the largest of {shown.scale})"
-    return replace(shown, title=words, scale="")
 
 
 def ranges(maps: Iterable[NodeMap]) -> dict[str, Range]:

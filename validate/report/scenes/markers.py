@@ -98,6 +98,10 @@ def markers(result: Result) -> Exhibit | None:
 def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
     count = len(seen.loaded)
     along = "" if seen.across is None else f", seen along {'xyz'[seen.across]}"
+    # The height of a row, so that panels to scale fill it
+    places = seen.at(seen.rest)[:, seen.plane]
+    wide, high = np.maximum(np.nanmax(places, axis=0) - np.nanmin(places, axis=0), 1e-9)
+    row = float(np.clip(WIDTH / 2 * high / wide + _TITLE, _FLAT + _TITLE, _PANEL))
     return Picture(
         "markers",
         f"The markers in the plane of {' and '.join('xyz'[i] for i in seen.plane)}{along}, mm. "
@@ -107,15 +111,8 @@ def _in_plane(seen: _Seen, judged: MethodResult) -> Picture:
         "the simulated ones as dots. If the model is right, about four dots in ten lie in their "
         "circle.",
         f"Marker displacement vectors and positions for {count} loads, measured and simulated.",
-        draw(lambda f: _panels(f, seen, judged), WIDTH, _row_height(seen) * count + _ROOM),
+        draw(lambda f: _panels(f, seen, judged), WIDTH, row * count + _ROOM),
     )
-
-
-def _row_height(seen: _Seen) -> float:
-    """Inches of a row, so that panels to scale fill it."""
-    places = seen.at(seen.rest)[:, seen.plane]
-    wide, high = np.maximum(np.nanmax(places, axis=0) - np.nanmin(places, axis=0), 1e-9)
-    return float(np.clip(WIDTH / 2 * high / wide + _TITLE, _FLAT + _TITLE, _PANEL))
 
 
 def _panels(figure: Figure, seen: _Seen, judged: MethodResult) -> None:
@@ -181,15 +178,16 @@ def _across(result: Result, seen: _Seen) -> tuple[Picture, ...]:
     known = [m for m in finished(result) if m.name in own]
     on = distinct([(m, own[m.name].positions.apply(m.run.u[seen.frames[-1]])[:, c]) for m in known])
     drawn = [(m, styles[m.name]) for m in known if m.name not in on]
-    x, names = "xyz"[seen.along], ", ".join(m.label for m, _ in drawn)
+    x, labels = "xyz"[seen.along], [m.label for m, _ in drawn]
+    height = 2.2 * -(-len(seen.loaded) // 2) + 0.6 + legend_height(["measured", *labels])
     made = Picture(
         "markers_across",
         f"Displacement of the markers along {'xyz'[c]} from rest against their {x}, mm. Bars: ± 1 "
         "standard deviation of a measured displacement (√2 times the declared noise). Each model's "
         f"line joins the mean of markers of equal rank in {x}.",
         f"Displacement of the markers along {'xyz'[c]} against {x} for each load: measured and "
-        f"{names}.",
-        draw(lambda f: _across_panels(f, seen, c, drawn), WIDTH, _across_height(seen, drawn)),
+        f"{', '.join(labels)}.",
+        draw(lambda f: _across_panels(f, seen, c, drawn), WIDTH, height),
     )
     return (made,)
 
@@ -207,7 +205,9 @@ def _across_panels(
         for method, look in drawn:
             own = markers_seen(method)
             assert own is not None
-            line = _banded(x, _MM * own.positions.apply(method.run.u[seen.frames[i]])[:, c])
+            y = _MM * own.positions.apply(method.run.u[seen.frames[i]])[:, c]
+            groups = np.array_split(np.argsort(x, kind="stable"), min(_BANDS, len(x)))
+            line = np.array([x[g].mean() for g in groups]), np.array([y[g].mean() for g in groups])
             ax.plot(*line, color=look.colour, ls=look.dash, lw=look.width, marker=look.point, ms=4,
                     label=method.label)  # fmt: skip
         ax.set_title(spaced(hold.label), loc="left", fontsize=8.5)
@@ -215,14 +215,3 @@ def _across_panels(
         ax.set_xlabel(seen.labels[seen.along])
     figure.supylabel(f"displacement along {'xyz'[c]} / mm", fontsize="medium")
     legend_below(figure, axes[0])
-
-
-def _across_height(seen: _Seen, drawn: list[tuple[MethodResult, Style]]) -> float:
-    names = ["measured", *(m.label for m, _ in drawn)]
-    return 2.2 * -(-len(seen.loaded) // 2) + 0.6 + legend_height(names)
-
-
-def _banded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Means over groups of neighbours in x."""
-    groups = np.array_split(np.argsort(x, kind="stable"), min(_BANDS, len(x)))
-    return np.array([x[g].mean() for g in groups]), np.array([y[g].mean() for g in groups])

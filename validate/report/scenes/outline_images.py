@@ -91,16 +91,22 @@ def outlines_over(
     up to twelve for a slider, and all as one picture. `which` they are, and `words` on what they
     are for, stand in the caption."""
     holds = tuple(Held(label, 0.0, "1", t) for label, t in at)
-    circles = _circles(contours, holds)
-    lines = [
-        [_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)]
-        + (
-            []
-            if circle is None
-            else [_ImageLine("circle through it", _FITTED, _DASH, _round(circle))]
+    circles = [_circle(contours, hold) for hold in holds]
+    if circles[0] is None or circles[0].rms > _ROUND * circles[0].radius:
+        circles = [None] * len(holds)
+    fitted = ""
+    if any(circles):
+        each = zip(holds, circles, strict=True)
+        fitted = (
+            " and the circle through it (dashed, blue). Radius of that circle and rms distance of "
+            f"the outline from it: {'; '.join(f'{spaced(h.label)}: {_told(c)}' for h, c in each)}"
         )
-        for hold, circle in zip(holds, circles, strict=True)
-    ]
+    lines = []
+    for hold, circle in zip(holds, circles, strict=True):
+        lines.append([_ImageLine("outline found", _FOUND, "-", closed(_outline(contours, hold)).T)])
+        if circle is not None:
+            around = _MM * (circle.centre[:, None] + circle.radius * _AROUND)
+            lines[-1].append(_ImageLine("circle through it", _FITTED, _DASH, around))
     for drawn, section in zip(lines, simulated[1], strict=False):
         drawn.append(_ImageLine(simulated[0], _SIMULATED, ":", closed(section).T))
     lines[0] += [_marked(mark) for mark in marks]
@@ -110,7 +116,7 @@ def outlines_over(
     panel = float(np.clip(0.42 * WIDTH * tall / wide, 1.2, 4.0)) + 0.35
     caption = (
         f"The images '{contours.images}' {which}, image coordinates in mm, with the outline that "
-        f"was found in each (solid, yellow){_of_circles(holds, circles)}. {words}"
+        f"was found in each (solid, yellow){fitted}. {words}"
     )
     alt = f"{len(holds)} images with the outline found in each" + (
         " and the circle fitted to it." if any(circles) else "."
@@ -141,24 +147,6 @@ def _circle(contours: Contours, hold: Held) -> Circle | None:
         return Circle.fit(_outline(contours, hold), contours.sd)
     except RegistrationError:
         return None  # an outline pressed flat is none
-
-
-def _circles(contours: Contours, holds: tuple[Held, ...]) -> list[Circle | None]:
-    found = [_circle(contours, hold) for hold in holds]
-    first = found[0]
-    if first is None or first.rms > _ROUND * first.radius:
-        return [None] * len(holds)
-    return found
-
-
-def _of_circles(holds: tuple[Held, ...], circles: list[Circle | None]) -> str:
-    if not any(circles):
-        return ""
-    told = "; ".join(f"{spaced(h.label)}: {_told(c)}" for h, c in zip(holds, circles, strict=True))
-    return (
-        " and the circle through it (dashed, blue). Radius of that circle and rms distance of the "
-        f"outline from it: {told}"
-    )
 
 
 def _told(circle: Circle | None) -> str:
@@ -203,20 +191,15 @@ def _image_axes(ax: Axes, frames: Frames, hold: Held, lines: list[_ImageLine]) -
     ax.imshow(frames.images[i], cmap="gray", vmin=0, vmax=255, extent=extent, aspect="equal")
     ax.grid(visible=False)
     for line in lines:
-        _line(ax, line)
+        if line.points.shape[1] == 1:  # a place without a size
+            ax.plot(*line.points, "+", color=line.colour, ms=9, mew=1.8, label=line.label)
+            continue
+        # With a dark seam, to be seen on light and dark pixels and on grey paper
+        known = ax.get_legend_handles_labels()[1]
+        label = line.label if line.label not in known else None
+        ax.plot(*line.points, color="black", lw=2.8, alpha=0.6)
+        ax.plot(*line.points, color=line.colour, ls=line.dash, lw=1.4, label=label)
     ax.set(xlabel="image x / mm", ylabel="image y / mm")
-
-
-def _line(ax: Axes, line: _ImageLine) -> None:
-    """With a dark seam, to be seen on light and dark pixels and on grey paper; a cross of a place
-    without a size."""
-    if line.points.shape[1] == 1:
-        ax.plot(*line.points, "+", color=line.colour, ms=9, mew=1.8, label=line.label)
-        return
-    known = ax.get_legend_handles_labels()[1]
-    label = line.label if line.label not in known else None
-    ax.plot(*line.points, color="black", lw=2.8, alpha=0.6)
-    ax.plot(*line.points, color=line.colour, ls=line.dash, lw=1.4, label=label)
 
 
 def _marked(mark: PlaceSaid) -> _ImageLine:
@@ -224,8 +207,3 @@ def _marked(mark: PlaceSaid) -> _ImageLine:
     if mark.radius is not None:
         points = points + _MM * mark.radius * _AROUND
     return _ImageLine(mark.label, _SAID if mark.certain else _SIMULATED, _DOTS, points)
-
-
-def _round(circle: Circle) -> Floats:
-    """A closed line (2, k) mm."""
-    return np.asarray(_MM * (circle.centre[:, None] + circle.radius * _AROUND))

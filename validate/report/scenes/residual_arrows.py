@@ -1,7 +1,6 @@
 """Registration residual at every marker as an arrow, magnified to the available space."""
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from validate.arrays import Floats
@@ -25,20 +24,20 @@ def residual_arrows(found: Registration) -> Picture:
     along = "the normal of their plane" if across is None else "xyz"[across]
     by = magnified(found, plane)
     how = f"arrows magnified {by:g} times" if by else "none beyond rounding"
+    longest = float(np.linalg.norm(found.residuals, axis=1).max())
+    # As high as its markers spread, within limits
+    half = _sides(found.markers[:, plane])[1]
+    height = float(np.clip(0.8 * WIDTH * half[1] / half[0], 2.2, 6.0)) + 0.9
     return Picture(
         "registration",
         "Registration residuals of the markers at rest, mapped minus target, in mm, seen along "
-        f"{along}; {how}. Largest: {with_unit(_longest(found), 'm')}. A pattern "
+        f"{along}; {how}. Largest: {with_unit(longest, 'm')}. A pattern "
         "(all outward, all turned) would mean a wrong scale or rotation; noise has none. Markers "
         "that lie behind one another share a name.",
         "Arrows of the registration residual at each marker, without a common direction if only "
         "noise is left.",
-        draw(lambda f: arrow_axes(f, found, plane), WIDTH, _height(found.markers[:, plane])),
+        draw(lambda f: arrow_axes(f, found, plane), WIDTH, height),
     )
-
-
-def _longest(found: Registration) -> float:
-    return float(np.linalg.norm(found.residuals, axis=1).max())
 
 
 def magnified(found: Registration, plane: list[int]) -> float:
@@ -64,12 +63,6 @@ def _sides(points: Floats) -> tuple[Floats, Floats]:
     return 0.5 * (low + high), np.maximum(half, _NARROWEST * longer) + 0.25 * longer
 
 
-def _height(points: Floats) -> float:
-    """Inches: the picture is as high as its markers spread, within limits."""
-    half = _sides(points)[1]
-    return float(np.clip(0.8 * WIDTH * half[1] / half[0], 2.2, 6.0)) + 0.9
-
-
 def arrow_axes(figure: Figure, found: Registration, plane: list[int]) -> None:
     """Markers, arrows, names, and the length of an arrow of round size."""
     ax, by = figure.subplots(), magnified(found, plane)
@@ -87,29 +80,22 @@ def arrow_axes(figure: Figure, found: Registration, plane: list[int]) -> None:
         ax.quiverkey(arrows, 0.72, 1.04, by * key, f"{key:g} mm", labelpos="E")
     ax.set_title(f"residuals, magnified {by:g} times" if by else
                  "no residual beyond rounding", loc="left", pad=13)  # fmt: skip
-    if len(x) <= _NAMED:
-        _names(ax, found.names, x, r, float(half.max()))
-
-
-def _names(ax: Axes, names: tuple[str, ...], x: Floats, r: Floats, half: float) -> None:
-    """Beside the markers, on the side that their arrow leaves free; above or below outer ones."""
-    for group in _groups(x, 2 * _NEAR * half):
-        at, arrow = x[group].mean(axis=0), r[group].sum(axis=0)
-        below = arrow[1] >= 0
-        ax.annotate(
-            ", ".join(names[i] for i in group), tuple(at), xytext=(0, -4 if below else 4),
-            textcoords="offset points", fontsize=8, color="#404040", ha="center",
-            va="top" if below else "bottom", annotation_clip=False,
-        )  # fmt: skip
-
-
-def _groups(x: Floats, near: float) -> list[list[int]]:
-    """Indices of points (k, 2) that lie together; every point in one group."""
+    if len(x) > _NAMED:
+        return
+    # Indices of markers that lie together: they share a name
     groups: list[list[int]] = []
     for i, at in enumerate(x):
+        near = 2 * _NEAR * float(half.max())
         group = next((g for g in groups if np.linalg.norm(x[g[0]] - at) < near), None)
         if group is None:
             groups.append([i])
         else:
             group.append(i)
-    return groups
+    # Names on the side that an arrow leaves free; above or below outer markers
+    for group in groups:
+        below = r[group].sum(axis=0)[1] >= 0
+        ax.annotate(
+            ", ".join(found.names[i] for i in group), tuple(x[group].mean(axis=0)),
+            xytext=(0, -4 if below else 4), textcoords="offset points", fontsize=8,
+            color="#404040", ha="center", va="top" if below else "bottom", annotation_clip=False,
+        )  # fmt: skip

@@ -133,21 +133,8 @@ def sheet(scene: BodyScene) -> Sheet:
     shown = {c: v for c, v in shown.items() if _told(spans, c)}
     by = rounded_down(_LONGEST * scene.size / longest) if longest > _LEAST else 1.0
     by = float(np.clip(by, 1.0, 100.0))
-    return Sheet(scene, coloured, _panels(scene, shown, spans, by), spans, by)
-
-
-def _told(spans: Mapping[str, Range], cell: _Cell) -> bool:
-    """Whether the colours of a cell show more than rounding."""
-    top = spans[cell.scale][1]
-    of = spans[cell.by][1] if cell.less is not None else 1.0
-    return top > _LEAST * of or cell.scale in (_DISPLACEMENT, _ERROR)
-
-
-def _panels(
-    scene: BodyScene, shown: Mapping[_Cell, Floats], spans: Mapping[str, Range], by: float
-) -> dict[_Cell, Pixels]:
-    """Opened where the body has a cavity; markers, of which those on the part that is taken away
-    would hang in the air, stand on the whole body then."""
+    # Opened where the body has a cavity; markers, of which those on the part that is taken away
+    # would hang in the air, stand on the whole body then
     stage, found = Stage(scene.camera, scene.size), dict[_Cell, Pixels]()
     plane = (scene.cut.normal, scene.cut.at * scene.cut.normal) if scene.cut else None
     bodies = [rendered_body(m.result.scene.mesh, m.nodes, plane) for m in scene.methods]
@@ -173,7 +160,14 @@ def _panels(
             add_outlines(stage, *method.outlines[cell.frame], scene.size)
         found[cell] = stage.shot()
     stage.plotter.close()
-    return found
+    return Sheet(scene, coloured, found, spans, by)
+
+
+def _told(spans: Mapping[str, Range], cell: _Cell) -> bool:
+    """Whether the colours of a cell show more than rounding."""
+    top = spans[cell.scale][1]
+    of = spans[cell.by][1] if cell.less is not None else 1.0
+    return top > _LEAST * of or cell.scale in (_DISPLACEMENT, _ERROR)
 
 
 def picture(drawn: Sheet, width: float) -> Picture:

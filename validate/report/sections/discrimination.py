@@ -1,6 +1,6 @@
 """Distinguishable effects of a recording: errors and effects against sensor noise."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
 
@@ -106,16 +106,16 @@ def noise_rows(result: Result) -> list[NoiseRow]:
     """Return a row for every quantity that has noise."""
     done = finished(result)
     quantities = dict.fromkeys(r.quantity for m in done for r in m.residuals.values() if r.sd > 0)
-    return [_row(done, quantity) for quantity in quantities]
-
-
-def _row(done: Iterable[MethodResult], quantity: str) -> NoiseRow:
-    seen = [(m, r) for m in done if (r := last_residual(m, quantity)) is not None]
-    ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
-    first = seen[0][1]
-    dof = first.values.size
-    low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
-    return NoiseRow(quantity, with_unit(_noise(first), first.unit), (low, high), ratios)
+    rows = []
+    for quantity in quantities:
+        seen = [(m, r) for m in done if (r := last_residual(m, quantity)) is not None]
+        ratios = tuple((m, rms(r.values) / _noise(r)) for m, r in seen)
+        first = seen[0][1]
+        dof = first.values.size
+        low, high = (float(np.sqrt(chdtri(dof, p) / dof)) for p in (0.975, 0.025))
+        noise = with_unit(_noise(first), first.unit)
+        rows.append(NoiseRow(quantity, noise, (low, high), ratios))
+    return rows
 
 
 def _noise(residual: Residual) -> float:

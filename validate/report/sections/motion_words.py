@@ -20,25 +20,23 @@ def rests(shown: RecordedMotion) -> str:
     return f"{first}, at rest from {shown.rests_from:.3g} s to the end"
 
 
-def _rhythm(shown: RecordedMotion) -> str:
-    """Return the main frequency, or why there is none: a steady change has noise alone beside."""
-    if not shown.resolution:
-        return "too few samples for a spectrum"
-    if abs(shown.drift) > _STEADY * shown.size:
-        return "changing steadily"
-    if shown.frequency < shown.resolution:
-        return f"slower than {shown.resolution:.2g} Hz"
-    return f"mostly at {shown.frequency:.3g} Hz (resolved to {shown.resolution:.2g} Hz)"
-
-
 def motion_words(shown: RecordedMotion) -> str:
     """Return the facts in one sentence."""
     along = ", ".join(f"{x:+.2f}" for x in shown.direction)
     way = f" along ({along})" if len(shown.direction) > 1 else ""
+    # The main frequency, or why there is none: a steady change has noise alone beside
+    if not shown.resolution:
+        rhythm = "too few samples for a spectrum"
+    elif abs(shown.drift) > _STEADY * shown.size:
+        rhythm = "changing steadily"
+    elif shown.frequency < shown.resolution:
+        rhythm = f"slower than {shown.resolution:.2g} Hz"
+    else:
+        rhythm = f"mostly at {shown.frequency:.3g} Hz (resolved to {shown.resolution:.2g} Hz)"
     return (
         f"'{shown.marker}' {'moves' if shown.unit == 'm' else 'changes'} most, "
         f"{with_unit(shown.size, shown.unit)} peak to peak{way}, "
-        f"{_rhythm(shown)}; {rests(shown)}; "
+        f"{rhythm}; {rests(shown)}; "
         f"{with_unit(shown.drift, shown.unit, 2)} from first to last sample; "
         f"{shown.rate:.4g} samples a second, {shown.gaps} gaps (longest {shown.gap:.3g} s), "
         f"{100 * shown.missing:.2g} % missing"

@@ -7,7 +7,7 @@ from validate.compare.result import Result
 from validate.numbers import text, with_unit
 from validate.recording.motion_capture.text_rows import ASSUMED
 from validate.recording.types import Recording
-from validate.report.stored.environment import Commit, Made, environment, file_name, without_folder
+from validate.report.stored.environment import Made, environment, file_name, without_folder
 
 _STREAMS = (
     "topic", "kind", "unit", "noise", "samples", "rate / Hz", "duration / s", "gaps",
@@ -21,7 +21,20 @@ def recording(result: Result) -> Exhibit | None:
     if not result.recordings:
         return None
     several = len(result.recordings) > 1
-    tables = [_files(result.recordings), _used(result)]
+    files = tuple(
+        (file_name(s.path), s.bytes, s.sha256 or "none", s.integrity)
+        for s in (r.source for r in result.recordings)
+    )
+    streams = tuple(
+        (s.recording, s.topic, s.kind, TableCell("yes" if s.used else "no", emphasis="strong"),
+         s.why)
+        for s in result.streams
+    )  # fmt: skip
+    title = "Every stream of the recordings, and whether this experiment uses it."
+    tables = [
+        NumberTable("", "Inputs.", ("file", "bytes", "SHA-256", "integrity"), files),
+        NumberTable("streams", title, ("recording", "topic", "kind", "used", "why"), streams),
+    ]
     tables += [_streams(r, several) for r in result.recordings]
     tables += [_assumed(r) for r in result.recordings if r.metadata.get(ASSUMED)]
     tables += [_metadata(r) for r in result.recordings if any(r.metadata.values())]
@@ -30,31 +43,22 @@ def recording(result: Result) -> Exhibit | None:
     return Exhibit("recording", "Recording", words, tuple(tables))
 
 
-def _used(result: Result) -> NumberTable:
-    rows = tuple(
-        (s.recording, s.topic, s.kind, TableCell("yes" if s.used else "no", emphasis="strong"),
-         s.why)
-        for s in result.streams
-    )  # fmt: skip
-    title = "Every stream of the recordings, and whether this experiment uses it."
-    return NumberTable("streams", title, ("recording", "topic", "kind", "used", "why"), rows)
-
-
-def _files(recordings: tuple[Recording, ...]) -> NumberTable:
-    rows = tuple(
-        (file_name(s.path), s.bytes, s.sha256 or "none", s.integrity)
-        for s in (r.source for r in recordings)
-    )
-    return NumberTable("", "Inputs.", ("file", "bytes", "SHA-256", "integrity"), rows)
-
-
 def _streams(record: Recording, several: bool) -> NumberTable:
     name = f" of {record.name}" if several else ""
     title = (
         f"Streams{name}. Noise: declared standard deviation; gaps: steps over three median steps."
     )
-    rows = tuple((*row, *_clock(record, str(row[0]))) for row in _kinds(record))
-    return NumberTable("", title, _STREAMS, rows, folded=several)
+    rows: list[tuple[Entry | TableCell, ...]] = []
+    for row in _kinds(record):
+        clock = record.clock.get(str(row[0]))
+        if clock is None:
+            rows.append((*row, *(None,) * 5))
+            continue
+        lasts = TableCell(clock.duration, text=text(clock.duration, "1", 4))
+        longest = TableCell(clock.longest_gap, "1")
+        rate = TableCell(clock.rate_hz, "1")
+        rows.append((*row, rate, lasts, clock.gaps, longest, clock.duplicates))
+    return NumberTable("", title, _STREAMS, tuple(rows), folded=several)
 
 
 def _kinds(record: Recording) -> Iterator[tuple[Entry, ...]]:
@@ -72,15 +76,6 @@ def _kinds(record: Recording) -> Iterator[tuple[Entry, ...]]:
 def _points(outlines: tuple[object, ...]) -> str:
     sizes = sorted({len(o) for o in outlines})  # type: ignore[arg-type]
     return str(sizes[0]) if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
-
-
-def _clock(record: Recording, topic: str) -> tuple[Entry | TableCell, ...]:
-    clock = record.clock.get(topic)
-    if clock is None:
-        return (None,) * 5
-    lasts = TableCell(clock.duration, text=text(clock.duration, "1", 4))
-    longest = TableCell(clock.longest_gap, "1")
-    return TableCell(clock.rate_hz, "1"), lasts, clock.gaps, longest, clock.duplicates
 
 
 def _metadata(record: Recording) -> NumberTable:
@@ -131,7 +126,9 @@ def how(result: Result, made: Made) -> Exhibit:
         ("path", "declared", "here", "unit"), rows, none,
     )  # fmt: skip
     said = [("command", made.command or "none: made from Python")]
-    said += [("commit", _commit(made.commit)), ("code and libraries, SHA-256", made.code_sha256)]
+    unknown = "unknown: the code is not in a clone, or git does not answer"
+    said += [("commit", str(made.commit) if made.commit else unknown)]
+    said += [("code and libraries, SHA-256", made.code_sha256)]
     said += [("commit of the experiment's project", str(made.project))] if made.project else []
     said += [("plug-ins", ", ".join(made.plug_ins))] if made.plug_ins else []
     tables = [differing, NumberTable("", "Command and code.", ("", "value"), tuple(said))]
@@ -140,10 +137,6 @@ def how(result: Result, made: Made) -> Exhibit:
         head = ("what", "file", "bytes", "SHA-256")
         tables.append(NumberTable("", "Files read in addition to the recordings.", head, files))
     return Exhibit("made", "How this was made", (), tuple(tables))
-
-
-def _commit(commit: Commit | None) -> str:
-    return str(commit) if commit else "unknown: the code is not in a clone, or git does not answer"
 
 
 def _plain(value: object) -> str:

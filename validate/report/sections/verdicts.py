@@ -1,9 +1,9 @@
 """Verdict in words: over all checks, as declared, with the basis of u_input (ASME V&V 20)."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 from validate.compare.effects import Joint
-from validate.compare.exhibit import Exhibit, NumberTable, TableCell
+from validate.compare.exhibit import Exhibit, TableCell
 from validate.compare.result import KINDS, Result
 from validate.report.export.tables import unit_cell
 from validate.report.views.view_filling import Shown, sized, table
@@ -37,43 +37,38 @@ def verdicts(result: Result) -> Exhibit | None:
         return None
     checked = "; ".join(f"{m.name}: {m.called}" for m in result.methods if m.checks)
     found = result.overall
+    # What the experiment declares of its verdicts, and which moved
+    declared = []
+    for e in result.expected:
+        check = "every check" if e.check == "*" else e.check
+        declared.append(f"Expected: {check} of {e.method} is {e.verdict}: {e.why}.")
+    declared += [f"Moved: {m.words}." for m in result.moved if result.expected]
     words = (
         f"Checked: {checked}. The other methods are candidates, listed for comparison.",
         f"The recording is: {KINDS[result.kind]}. Verdict over all: {found.word}, "
         f"{found.counted}. {found.corrections}",
-        *_as_declared(result),
+        *declared,
     )
-    return Exhibit("checks", "Checks", words, tuple(_inputs(result)))
+    # Where the ranges behind u_input come from, and what first order leaves out of it
+    tables = []
+    if result.inputs:
+        title = "Uncertain inputs of u_input; a range that was not measured is marked."
+        columns = {"input": "name", "range": "range", "source": "source"}
+        tables.append(table("inputs", title, result.inputs, columns, folded=True))
+    if result.joint:
+        title = (
+            "u_input to first order, one input at a time, and by draws of all inputs together "
+            "(Latin hypercube of uniform ranges; rms distance from the simulated value). Checks "
+            "use first order."
+        )
+        tables.append(table("joint_inputs", title, result.joint, _JOINT, folded=True))
+    return Exhibit("checks", "Checks", words, tuple(tables))
 
 
 def found_besides(result: Result) -> Exhibit:
     """What identification says in words, and the experiment's notes."""
     words = (f"{v.name} by {v.by}: {v.finding}." for v in result.identified_values if v.finding)
     return Exhibit("identified", "Identified parameters and notes", (*words, *result.notes))
-
-
-def _as_declared(result: Result) -> Iterator[str]:
-    """What the experiment declares of its verdicts, and which moved."""
-    for e in result.expected:
-        check = "every check" if e.check == "*" else e.check
-        yield f"Expected: {check} of {e.method} is {e.verdict}: {e.why}."
-    yield from (f"Moved: {m.words}." for m in result.moved if result.expected)
-
-
-def _inputs(result: Result) -> Iterator[NumberTable]:
-    """Where the ranges behind u_input come from, and what first order leaves out of it."""
-    if result.inputs:
-        title = "Uncertain inputs of u_input; a range that was not measured is marked."
-        columns = {"input": "name", "range": "range", "source": "source"}
-        yield table("inputs", title, result.inputs, columns, folded=True)
-    if result.joint:
-        yield table(
-            "joint_inputs",
-            "u_input to first order, one input at a time, and by draws of all inputs together "
-            "(Latin hypercube of uniform ranges; rms distance from the simulated value). Checks "
-            "use first order.",
-            result.joint, _JOINT, folded=True,
-        )  # fmt: skip
 
 
 def _difference(found: Joint) -> TableCell:

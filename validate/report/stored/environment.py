@@ -36,36 +36,23 @@ def environment() -> dict[str, str]:
     found = {"python": platform.python_version()}
     found |= {name: _version(distribution) for name, distribution in _PACKAGES}
     found["platform"] = f"{platform.system()} {platform.release()} {platform.machine()}"
-    found["os"] = _system()
-    found["cpu"] = _processor()
+    try:
+        found["os"] = platform.freedesktop_os_release().get("PRETTY_NAME", "unknown")
+    except OSError:
+        found["os"] = f"{platform.system()} {platform.version()}"
+    models: list[str] = []
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text("utf-8").splitlines()
+        pairs = (line.partition(":") for line in lines)
+        models = [name.strip() for key, _, name in pairs if key.strip() == "model name"]
+    found["cpu"] = models[0] if models else platform.processor() or "unknown"
     found["cpu_count"] = str(os.cpu_count() or "unknown")
-    found["memory"] = _memory()
+    found["memory"] = "unknown"
+    with contextlib.suppress(AttributeError, ValueError, OSError):  # not every system says it
+        size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        found["memory"] = f"{size / 2**30:.1f} GiB"
     found |= {name: os.environ.get(name, "unset") for name in _THREADS}
     return found
-
-
-def _system() -> str:
-    with contextlib.suppress(OSError):
-        return platform.freedesktop_os_release().get("PRETTY_NAME", "unknown")
-    return f"{platform.system()} {platform.version()}"
-
-
-def _processor() -> str:
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
-            key, _, name = line.partition(":")
-            if key.strip() == "model name":
-                return name.strip()
-    return platform.processor() or "unknown"
-
-
-def _memory() -> str:
-    """All of the machine's, which not every system says."""
-    try:
-        size = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):
-        return "unknown"
-    return f"{size / 2**30:.1f} GiB"
 
 
 def _version(distribution: str) -> str:
@@ -139,11 +126,15 @@ def made(
     command = shlex.join(["validate", *map(_told, arguments)]) if arguments else ""
     ours, theirs = commit_of([PACKAGE]), commit_of(sources)
     same = theirs is None or (ours is not None and theirs.sha == ours.sha and not theirs.dirty)
-    files = (*(("experiment", f) for f in sources), *((_role(f), f) for f in meshes))
-    return Made(
-        command, ours, None if same else theirs, code_sha256(),
-        tuple(_used(role, path) for role, path in files),
-    )  # fmt: skip
+    layouts = (".fcsv", ".json")
+    roles = [("experiment", path) for path in sources]
+    roles += [("layout" if p.suffix.lower() in layouts else "mesh", p) for p in meshes]
+    files = []
+    for role, path in roles:
+        with path.open("rb") as stream:
+            sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
+        files.append(UsedFile(role, file_name(str(path)), sha256, path.stat().st_size))
+    return Made(command, ours, None if same else theirs, code_sha256(), tuple(files))
 
 
 def _told(argument: str) -> str:
@@ -152,16 +143,6 @@ def _told(argument: str) -> str:
     key, sign, value = (before, equals, after) if equals else ("", "", argument)
     short = str(without_folder(value))
     return argument if short == value else f"{key}{sign}{_LEFT_OUT}{short}"
-
-
-def _role(path: Path) -> str:
-    return "layout" if path.suffix.lower() in (".fcsv", ".json") else "mesh"
-
-
-def _used(role: str, path: Path) -> UsedFile:
-    with path.open("rb") as stream:
-        sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-    return UsedFile(role, file_name(str(path)), sha256, path.stat().st_size)
 
 
 def commit_of(paths: Sequence[Path]) -> Commit | None:

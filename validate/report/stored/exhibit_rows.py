@@ -124,18 +124,16 @@ def _table(table: NumberTable) -> Json:
 
 
 def _chart(chart: Chart, most: int) -> Json:
-    return members(chart, "name", "title", "x", "y", "log", "caption") | {
-        "levels": [{"name": name, "y": float(y)} for name, y in chart.levels],
-        "series": [_series(s, most) for s in chart.series],
-    }
-
-
-def _series(series: Series, most: int) -> Json:
-    at = thinned(series.y, most)
-    arrays = {"x": rounded(series.x[at]), "y": rounded(series.y[at])}
-    if series.upper is not None:
-        arrays["upper"] = rounded(series.upper[at])
-    return {"label": series.name, "style": series.style, "points": len(series.x), **arrays}
+    levels = [{"name": name, "y": float(y)} for name, y in chart.levels]
+    series = []
+    for s in chart.series:
+        at = thinned(s.y, most)
+        arrays = {"x": rounded(s.x[at]), "y": rounded(s.y[at])}
+        if s.upper is not None:
+            arrays["upper"] = rounded(s.upper[at])
+        series.append({"label": s.name, "style": s.style, "points": len(s.x), **arrays})
+    own = members(chart, "name", "title", "x", "y", "log", "caption")
+    return own | {"levels": levels, "series": series}
 
 
 def _map(shown: NodeMap) -> Json:

@@ -225,11 +225,16 @@ def _taken(place: Path, folder: Path, *, shared: bool) -> int:
         os.close(descriptor)  # removed by its last holder meanwhile
     if alone:
         os.ftruncate(descriptor, 0)
-        os.pwrite(descriptor, _holder(), 0)
+        command = shlex.join(["validate", *sys.argv[1:]]) if sys.argv else "Python"
+        holder = json.dumps({
+            "command": command[:200], "process": os.getpid(), "host": socket.gethostname(),
+            "since": datetime.now(UTC).isoformat(timespec="seconds"),
+        })  # fmt: skip
+        os.pwrite(descriptor, holder.encode(), 0)
         # Puts back a folder between its two renames and what was kept of an old one; removes the
         # rest. A folder that was being filled holds nothing that is kept, so that all left-overs
         # are alike.
-        left = [*_left_overs(folder), *(_inside(folder) if folder.is_dir() else ())]
+        left = _left_overs(folder)
         old = next((p for p in left if p.name.startswith(f".{folder.name}.old-")), None)
         if old is not None and not folder.exists():
             old.rename(folder)
@@ -265,18 +270,6 @@ def _is_there(place: Path, descriptor: int) -> bool:
         return False
 
 
-def _holder() -> bytes:
-    command = shlex.join(["validate", *sys.argv[1:]]) if sys.argv else "Python"
-    return json.dumps(
-        {
-            "command": command[:200],
-            "process": os.getpid(),
-            "host": socket.gethostname(),
-            "since": datetime.now(UTC).isoformat(timespec="seconds"),
-        }
-    ).encode()
-
-
 def _named(holder: str) -> str:
     try:
         told = json.loads(holder)
@@ -290,12 +283,10 @@ def _named(holder: str) -> str:
 
 
 def _left_overs(folder: Path) -> list[Path]:
+    """Beside a folder; inside it those of studies and of their cells."""
     patterns = (f".{escape(folder.name)}.{what}-????????" for what in _LEFT)
-    return sorted(p for pattern in patterns for p in folder.parent.glob(pattern))
-
-
-def _inside(folder: Path) -> list[Path]:
-    """Of studies inside a report's folder, and of their cells."""
+    beside = sorted(p for pattern in patterns for p in folder.parent.glob(pattern))
     names = [f".{STUDIES}.{what}-????????" for what in _LEFT]
     names += [f".{CELLS}.try-????????", f"{STUDIES}/.{CELLS}.try-????????"]
-    return sorted(p for name in names for p in folder.glob(name))
+    inside = sorted(p for name in names for p in folder.glob(name)) if folder.is_dir() else []
+    return beside + inside

@@ -47,8 +47,11 @@ def carried(folder: Path, content: Json) -> list[str]:
     last."""
     lines = _texts(folder)
     old = current(folder)
-    if old is not None and not _alike(old, line_of(long_table(content, folder.name))):
-        lines.append(_text({**old, "replaced": content["created"]}))
+    if old is not None:
+        before, now = _maker(old), _maker(line_of(long_table(content, folder.name)))
+        if not before[0] or before != now:  # something that made the two runs differs
+            replaced_line = sealed({**old, "replaced": content["created"]})
+            lines.append(json.dumps(replaced_line, ensure_ascii=False, allow_nan=False))
     return lines
 
 
@@ -99,15 +102,6 @@ def _texts(folder: Path) -> list[str]:
     except OSError:
         return []
     return [line for line in text.splitlines() if line.strip()]
-
-
-def _text(line: Json) -> str:
-    return json.dumps(sealed(line), ensure_ascii=False, allow_nan=False)
-
-
-def _alike(one: Json, other: Json) -> bool:
-    """Whether all that made two runs is equal."""
-    return bool(_maker(one)[0]) and _maker(one) == _maker(other)
 
 
 def _maker(line: Json) -> tuple[Any, ...]:

@@ -27,11 +27,9 @@ def recorded(value: object) -> Any:
 
 def members(value: object, *names: str) -> Json:
     """Some of an object's members by their names; all fields of a dataclass without names."""
-    return {name: recorded(getattr(value, name)) for name in names or _fields(value)}
-
-
-def _fields(value: object) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(value)) if is_dataclass(value) else ()
+    if not names and is_dataclass(value):
+        names = tuple(f.name for f in fields(value))
+    return {name: recorded(getattr(value, name)) for name in names}
 
 
 def write_json(content: Json, path: Path) -> None:

@@ -94,38 +94,28 @@ def history(reports: Path, name: str) -> tuple[PastRun, ...]:
 def _runs(folder: Path) -> Iterator[PastRun]:
     try:
         for line in lines_of(folder):
-            yield _past(folder.name, line)
+            made = line.get("made") or {}
+            files = [*line["inputs"], *made.get("files", [])]
+            verdict = "passed" if line.get("passed") else "failed"
+            if overall := line.get("overall"):
+                checks = f"{overall['evidence']} of {overall['checks']} checks"
+                verdict = f"{overall['verdict']}; evidence: {checks}"
+            sha = str(made.get("commit") or "")[:10]
+            commit = f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
+            yield PastRun(
+                folder.name, str(line["created"]), verdict, commit,
+                str(made.get("code_sha256") or ""),
+                tuple(str(m) for m in line["methods"]),
+                tuple(str(i["sha256"]) for i in line["inputs"]),
+                {str(f["path"]): str(f["sha256"]) for f in files},
+                {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
+                tuple(_check(c) for c in line["checks"]), line,
+            )  # fmt: skip
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(
             f"{folder / LINES} has a line that `validate` did not write ({error!r:.60}); "
             "correct or remove the file"
         ) from error
-
-
-def _past(folder: str, line: Json) -> PastRun:
-    made = line.get("made") or {}
-    files = [*line["inputs"], *made.get("files", [])]
-    return PastRun(
-        folder, str(line["created"]), _verdict(line), _commit(made),
-        str(made.get("code_sha256") or ""),
-        tuple(str(m) for m in line["methods"]),
-        tuple(str(i["sha256"]) for i in line["inputs"]),
-        {str(f["path"]): str(f["sha256"]) for f in files},
-        {k: (v["value"], v["unit"]) for k, v in line["parameters"].items()},
-        tuple(_check(c) for c in line["checks"]), line,
-    )  # fmt: skip
-
-
-def _verdict(line: Json) -> str:
-    overall = line.get("overall")
-    if not overall:
-        return "passed" if line.get("passed") else "failed"
-    return f"{overall['verdict']}; evidence: {overall['evidence']} of {overall['checks']} checks"
-
-
-def _commit(made: Json) -> str:
-    sha = str(made.get("commit") or "")[:10]
-    return f"{sha}{', with changes' if made.get('dirty') else ''}" if sha else "unknown"
 
 
 def _check(c: Json) -> PastCheck:
@@ -151,14 +141,21 @@ def since(one: PastRun, other: PastRun) -> Since:
     before = {(c.method, c.name): c for c in one.checks}
     for c in other.checks:
         earlier = before.get((c.method, c.name))
-        if earlier and earlier.unit == c.unit:
-            moves += _moves(earlier, c, same=same)
+        if not earlier or earlier.unit != c.unit or earlier.value is None or c.value is None:
+            continue
+        by = abs(c.value - earlier.value)
+        u = math.hypot(earlier.u_num, c.u_num) if same else math.hypot(earlier.u_val, c.u_val)
+        ratio = by / u if u else None
+        if by <= _ROUNDING * max(abs(earlier.value), abs(c.value)):
+            ratio = 0.0
+        moves.append(Move(c.method, c.name, earlier.value, c.value, c.unit, ratio))
     moved = [m for m in moves if m.ratio is None or m.ratio > BEYOND]
     rest = [m.ratio for m in moves if m.ratio is not None and m.ratio <= BEYOND]
+    same_code = one.code == other.code and one.commit == other.commit
     return Since(
         parameters=_apart(_shown(one, other), _shown(other, one)),
         files=_apart(one.files, other.files),
-        code=_code(one, other),
+        code=None if same_code else (one.commit, other.commit),
         verdict=None if one.verdict == other.verdict else (one.verdict, other.verdict),
         added=tuple(m for m in other.methods if m not in one.methods),
         left_out=tuple(m for m in one.methods if m not in other.methods),
@@ -166,24 +163,6 @@ def since(one: PastRun, other: PastRun) -> Since:
         within=len(rest),
         most=max(rest, default=0.0),
     )
-
-
-def _moves(one: PastCheck, other: PastCheck, *, same: bool) -> Iterator[Move]:
-    if one.value is None or other.value is None:
-        return
-    by = abs(other.value - one.value)
-    u = math.hypot(one.u_num, other.u_num) if same else math.hypot(one.u_val, other.u_val)
-    if by <= _ROUNDING * max(abs(one.value), abs(other.value)):
-        ratio: float | None = 0.0
-    else:
-        ratio = by / u if u else None
-    yield Move(other.method, other.name, one.value, other.value, other.unit, ratio)
-
-
-def _code(one: PastRun, other: PastRun) -> tuple[str, str] | None:
-    if one.code == other.code and one.commit == other.commit:
-        return None
-    return one.commit, other.commit
 
 
 def _shown(run: PastRun, beside: PastRun) -> dict[str, str]:

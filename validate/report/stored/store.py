@@ -14,7 +14,6 @@ import numpy as np
 from validate.arrays import Floats, rms
 from validate.compare.overall_verdict import Overall
 from validate.compare.published import Published
-from validate.compare.residual import Residual
 from validate.compare.result import MethodResult, Result, domains
 from validate.compare.score import Score
 from validate.compare.verdict import Check
@@ -56,6 +55,7 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
     # What the first accepted method covered, else the first one
     method = next((m for m in result.methods if m.accepted), next(iter(result.methods), None))
     names = tuple(r.name for r in result.recordings)
+    by = made or Made()
     return {
         "schema_version": SCHEMA_VERSION,
         "experiment": result.name,
@@ -81,12 +81,25 @@ def document(result: Result, created: str, made: Made | None = None) -> Json:
             for p in result.parameters
         },
         "changed": [members(c) for c in result.changed],
-        "made": _made(made or Made()),
+        "made": {
+            "command": by.command,
+            "commit": by.commit and by.commit.sha,
+            "dirty": by.commit and by.commit.dirty,
+            "project_commit": by.project and by.project.sha,
+            "project_dirty": by.project and by.project.dirty,
+            "code_sha256": by.code_sha256,
+            "files": [members(f) for f in by.files],
+            "plug_ins": list(by.plug_ins),
+        },
         "environment": environment(),
         "methods": [_method(m, result, share) for m in result.methods],
         "domain": recorded(domains(method, names, result.specimens) if method else ()),
         "effects": recorded(result.effects),
-        "rest": [_rest(r) for r in result.rest],
+        "rest": [
+            {"name": r.name, "unit": r.unit, "sd": recorded(r.sd), "count": r.count,
+             "rms": recorded(rms(r.values))}
+            for r in result.rest
+        ],
         "identified": identified_members(result),
         "published": [figure_members(p) for p in result.published],
         "uncertain_inputs": [members(i) for i in result.inputs],
@@ -161,20 +174,6 @@ def _score(score: Score) -> Json:
     return members(score) | why
 
 
-def _made(made: Made) -> Json:
-    ours, theirs = made.commit, made.project
-    return {
-        "command": made.command,
-        "commit": ours and ours.sha,
-        "dirty": ours and ours.dirty,
-        "project_commit": theirs and theirs.sha,
-        "project_dirty": theirs and theirs.dirty,
-        "code_sha256": made.code_sha256,
-        "files": [members(f) for f in made.files],
-        "plug_ins": list(made.plug_ins),
-    }
-
-
 def overall_members(found: Overall) -> Json:
     """Return the verdict over all checks; names of those that decide it."""
     return {
@@ -208,10 +207,3 @@ def figure_members(figure: Published) -> Json:
         "result": figure.result,
     }  # fmt: skip
     return members(figure) | judged
-
-
-def _rest(r: Residual) -> Json:
-    return {
-        "name": r.name, "unit": r.unit, "sd": recorded(r.sd), "count": r.count,
-        "rms": recorded(rms(r.values)),
-    }  # fmt: skip

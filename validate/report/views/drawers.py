@@ -92,25 +92,24 @@ def save(found: Exhibit, run: "HasMethods", path: Path) -> None:
 
         path.write_text(tabular(found.tables[0]), encoding="utf-8")
     else:
-        write_csv(path, *_cells(parts[0]), as_shown=bool(found.tables))
-
-
-def _cells(part: NumberTable | Chart | Heat | Intervals) -> tuple[tuple[str, ...], Iterable[Row]]:
-    """Head and rows of the file of a table, or of the numbers that are drawn."""
-    match part:
-        case NumberTable():
-            return part.headings, part.rows
-        case Chart():
-            return chart_rows(part)
-        case Heat():
-            lines = zip(part.rows, part.values.tolist(), strict=True)
-            return (part.y, part.x, part.quantity), (
-                (row, column, v if np.isfinite(v) else None)
-                for row, values in lines for column, v in zip(part.columns, values, strict=True)
-            )  # fmt: skip
-        case Intervals():
-            rows = zip(part.labels, part.texts, part.answers, strict=True)
-            return ("check", "E ± 2 u_val of limit", "verdict"), rows
+        # Head and rows of a table, or of the numbers that are drawn
+        head: tuple[str, ...]
+        rows: Iterable[Row]
+        match parts[0]:
+            case NumberTable() as part:
+                head, rows = part.headings, part.rows
+            case Chart() as part:
+                head, rows = chart_rows(part)
+            case Heat() as part:
+                lines = zip(part.rows, part.values.tolist(), strict=True)
+                head, rows = (part.y, part.x, part.quantity), (
+                    (row, column, v if np.isfinite(v) else None)
+                    for row, values in lines for column, v in zip(part.columns, values, strict=True)
+                )  # fmt: skip
+            case Intervals() as part:
+                head = ("check", "E ± 2 u_val of limit", "verdict")
+                rows = zip(part.labels, part.texts, part.answers, strict=True)
+        write_csv(path, head, rows, as_shown=bool(found.tables))
 
 
 # --- a static picture -----------------------------------------------------------------------------
@@ -186,7 +185,13 @@ def terminal(found: Exhibit, width: int) -> list[str]:
         title = [chart.title] if chart.title != found.title else []
         lines += ["", *title, *plotted(chart, width)]
     for one in found.intervals:
-        lines += _bars(one, width)
+        # A line an interval, with a bar up to its limit, or, without one, up to 2 u_val
+        bars = [
+            bar(value, half, limit) if limit > 0 else bar(value, 0.0, half) if half > 0 else ""
+            for value, half, limit in zip(one.values, one.halves, one.limits, strict=True)
+        ]
+        rows = [list(row) for row in zip(one.labels, bars, one.texts, one.answers, strict=True)]
+        lines += [legend("limit, or 2 u_val without one"), *laid([""] * 4, rows, width)]
     for heat in found.heats:
         heads = [heat.y, *heat.columns]
         rows = [[name, *(significant(v) if np.isfinite(v) else "" for v in values)]
@@ -195,16 +200,6 @@ def terminal(found: Exhibit, width: int) -> list[str]:
     notes = [part.note for part in found.tables] + [chart.caption for chart in found.charts]
     lines += [line for note in dict.fromkeys(filter(None, notes)) for line in wrapped(note, width)]
     return lines if len(lines) > 1 else [*lines, _NOTHING]
-
-
-def _bars(one: Intervals, width: int) -> list[str]:
-    """A line an interval, with a bar up to its limit, or, without one, up to 2 u_val."""
-    bars = [
-        bar(value, half, limit) if limit > 0 else bar(value, 0.0, half) if half > 0 else ""
-        for value, half, limit in zip(one.values, one.halves, one.limits, strict=True)
-    ]
-    rows = [list(row) for row in zip(one.labels, bars, one.texts, one.answers, strict=True)]
-    return [legend("limit, or 2 u_val without one"), *laid([""] * 4, rows, width)]
 
 
 # --- error, uncertainty and limit as one bar of characters ---------------------------------------

@@ -41,9 +41,22 @@ def laid(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list
     """
     columns = range(len(head))
     found = _aligned(head, rows, width, columns)
-    if found is None and (last := _last_sentences(head, rows)) is not None:
-        found = _aligned(head, rows, width, [c for c in columns if c != last], last)
-    return found or [line for row in rows for line in _paragraph(head, row, width)]
+    if found is None:
+        # The last column that may go below its row; the first one names it and stays
+        soft = [c for c in columns[1:] if _sentences([row[c] for row in rows])]
+        if soft:
+            last = soft[-1]
+            found = _aligned(head, rows, width, [c for c in columns if c != last], last)
+    if found:
+        return found
+    # The first cell, then the others with their names
+    paragraphs = []
+    for first, *others in rows:
+        named = [f"{h}: {cell}" if h else cell for h, cell in zip(head[1:], others, strict=True)]
+        rest = "; ".join(text for text, cell in zip(named, others, strict=True) if cell)
+        paragraphs += wrapped(first, width, _BELOW)
+        paragraphs += wrapped(_BELOW + rest, width, _BELOW) if rest else []
+    return paragraphs
 
 
 def _aligned(
@@ -54,7 +67,18 @@ def _aligned(
     below: int | None = None,
 ) -> list[str] | None:
     """The columns side by side, that of `below` under each row; None where they have no room."""
-    widths = _widths([head[c] for c in columns], [[row[c] for c in columns] for row in rows], width)
+    natural, least = [], []
+    for column in columns:
+        cells = [row[column] for row in rows]
+        words = max(max(map(len, text.split()), default=0) for text in (head[column], *cells))
+        longest = max(map(len, cells))
+        natural.append(max(len(head[column]), longest))
+        least.append(max(words, _LEAST if _sentences(cells) else longest))
+    # Sentences are cut down to one common width, the largest that fits
+    room = width - len(_GAP) * (len(natural) - 1)
+    caps = ([max(low, min(n, cap)) for low, n in zip(least, natural, strict=True)]
+            for cap in range(max(natural), 0, -1))  # fmt: skip
+    widths = next((found for found in caps if sum(found) <= room), None)
     if widths is None:
         return None
     found = list(_side_by_side([head[c] for c in columns], widths))
@@ -65,28 +89,8 @@ def _aligned(
     return found
 
 
-def _widths(head: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[int] | None:
-    """Of every column; sentences are cut down to one common width, the largest that fits."""
-    natural, least = [], []
-    for name, *cells in zip(head, *rows, strict=True):
-        words = max(max(map(len, text.split()), default=0) for text in (name, *cells))
-        longest = max(map(len, cells))
-        natural.append(max(len(name), longest))
-        least.append(max(words, _LEAST if _sentences(cells) else longest))
-    room = width - len(_GAP) * (len(natural) - 1)
-    caps = ([max(low, min(n, cap)) for low, n in zip(least, natural, strict=True)]
-            for cap in range(max(natural), 0, -1))  # fmt: skip
-    return next((found for found in caps if sum(found) <= room), None)
-
-
 def _sentences(column: Sequence[str]) -> bool:
     return max(map(len, column)) > _LEAST and any(" " in cell for cell in column)
-
-
-def _last_sentences(head: Sequence[str], rows: Sequence[Sequence[str]]) -> int | None:
-    """The last column that may go below its row; the first one names it and stays."""
-    soft = [c for c in range(1, len(head)) if _sentences([row[c] for row in rows])]
-    return soft[-1] if soft else None
 
 
 def _side_by_side(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
@@ -94,13 +98,3 @@ def _side_by_side(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
     for i in range(max(map(len, parts))):
         line = [part[i] if i < len(part) else "" for part in parts]
         yield _GAP.join(f"{t:<{w}}" for t, w in zip(line, widths, strict=True)).rstrip()
-
-
-def _paragraph(head: Sequence[str], row: Sequence[str], width: int) -> list[str]:
-    """The first cell, then the others with their names."""
-    named = [f"{h}: {cell}" if h else cell for h, cell in zip(head[1:], row[1:], strict=True)]
-    rest = "; ".join(text for text, cell in zip(named, row[1:], strict=True) if cell)
-    return [
-        *wrapped(row[0], width, _BELOW),
-        *(wrapped(_BELOW + rest, width, _BELOW) if rest else []),
-    ]

@@ -99,7 +99,10 @@ def filled(view: View, table: LongTable) -> Exhibit:
     groups: dict[str, list[LongRow]] = {}
     for row in found:
         groups.setdefault(_label(row, view.each, table) if view.each else "", []).append(row)
-    parts = [(_named(view, key), rows) for key, rows in groups.items()]
+    parts = []
+    for key, rows in groups.items():  # the name and the title of one of several with the group's
+        name, title = f"{view.name}_{key.replace('.', '_')}", f"{view.title}: {key}"
+        parts.append((replace(view, name=name, title=title) if key else view, rows))
     one = Exhibit(view.name, view.title)
     match view.form:
         case "table":
@@ -115,14 +118,6 @@ def filled(view: View, table: LongTable) -> Exhibit:
             return replace(one, intervals=tuple(b for b in bars if b.labels))
         case "sentences":
             return replace(one, words=tuple(_sentence(view, row, table) for row in found))
-
-
-def _named(view: View, key: str) -> View:
-    """The view of one of several groups: its name and title with the group's."""
-    if not key:
-        return view
-    name = f"{view.name}_{key.replace('.', '_')}"
-    return replace(view, name=name, title=f"{view.title}: {key}")
 
 
 # --- labels and units -----------------------------------------------------------------------------
@@ -171,8 +166,23 @@ def _shown(unit: str, wanted: str) -> tuple[str, Callable[[float], float]]:
 def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable:
     """Lines by the labels `x`, columns by the labels `by`; units in headings where one column has
     one, else in a column of their own, else beside each number."""
-    labels, grid = texts(view.x), _grid(view, rows, table)
-    across = _across(view, rows, table)
+    labels, by = texts(view.x), texts(view.by)
+    grid: Grid = {}
+    for row in rows:
+        line = grid.setdefault(_key(row, labels, table), {})
+        line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
+    # Heading, label and column of what each column shows
+    y = texts(view.y)
+    keys = dict.fromkeys(" ".join(filter(None, _key(r, by, table))) for r in rows)
+    if view.columns:
+        parts = [(head, *text.partition(":")[::2]) for head, text in view.columns.items()]
+        across = [(head.replace("*", star), key, column or y[0])
+                  for head, label, column in parts
+                  for key, star in _matched(label, keys)]  # fmt: skip
+    else:
+        named = len(y) > 1 or "" in keys
+        across = [(" ".join(filter(None, (key, column if named else ""))), key, column)
+                  for key in keys for column in y]  # fmt: skip
     cells = [[_cell(view, line.get(key, []), column, _check(line)) for _, key, column in across]
              for line in grid.values()]  # fmt: skip
     kept = [j for j in range(len(across)) if any(plain(c[j]) not in (None, "") for c in cells)]
@@ -201,29 +211,6 @@ def _table(view: View, rows: Sequence[LongRow], table: LongTable) -> NumberTable
     )
 
 
-def _grid(view: View, rows: Sequence[LongRow], table: LongTable) -> Grid:
-    labels, by = texts(view.x), texts(view.by)
-    grid: Grid = {}
-    for row in rows:
-        line = grid.setdefault(_key(row, labels, table), {})
-        line.setdefault(" ".join(filter(None, _key(row, by, table))), []).append(row)
-    return grid
-
-
-def _across(view: View, rows: Sequence[LongRow], table: LongTable) -> list[tuple[str, str, str]]:
-    """Heading, label and column of what each column shows."""
-    y = texts(view.y)
-    keys = dict.fromkeys(" ".join(filter(None, _key(r, texts(view.by), table))) for r in rows)
-    if view.columns:
-        parts = [(head, *text.partition(":")[::2]) for head, text in view.columns.items()]
-        return [(head.replace("*", star), key, column or y[0])
-                for head, label, column in parts
-                for key, star in _matched(label, keys)]  # fmt: skip
-    told = len(y) > 1 or "" in keys
-    return [(" ".join(filter(None, (key, column if told else ""))), key, column)
-            for key in keys for column in y]  # fmt: skip
-
-
 def _matched(label: str, keys: Iterable[str]) -> list[tuple[str, str]]:
     """The label itself, or the keys that fit one with a star, and what the star stands for."""
     if "*" not in label:
@@ -240,7 +227,15 @@ def _check(line: Mapping[str, list[LongRow]]) -> LongRow | None:
 
 
 def _cell(view: View, rows: list[LongRow], column: str, check: LongRow | None) -> TableCell:
-    row = _chosen(view, rows, column)
+    if len(rows) > 1 and not view.several:
+        first = rows[0]
+        raise ComparisonError(
+            f"view '{view.name}': {len(rows)} rows are in one cell ({first.method} {first.name}); "
+            "name more columns in x or by, narrower rows, or `several`"
+        )
+    row = rows[-1] if rows else None
+    if view.several == "largest":
+        row = max(rows, key=lambda r: abs(_number(r, column) or 0.0), default=None)
     if row is None:
         return TableCell(None)
     if column in _NUMBERS:
@@ -272,18 +267,6 @@ def _to_decimal(view: View, row: LongRow, number: float | None, check: LongRow |
     found = to_decimal_of(term * turn(_TWO * check.sd), turn(number))[1]
     changed = float(digits(found)) != float(f"{turn(number):.9g}")
     return "" if row.part == "check.limit" and changed else found
-
-
-def _chosen(view: View, rows: list[LongRow], column: str) -> LongRow | None:
-    if len(rows) > 1 and not view.several:
-        first = rows[0]
-        raise ComparisonError(
-            f"view '{view.name}': {len(rows)} rows are in one cell ({first.method} {first.name}); "
-            "name more columns in x or by, narrower rows, or `several`"
-        )
-    if view.several == "largest":
-        return max(rows, key=lambda r: abs(_number(r, column) or 0.0), default=None)
-    return rows[-1] if rows else None
 
 
 def _units(cells: Iterable[TableCell]) -> set[str]:
@@ -319,7 +302,12 @@ def _chart(view: View, rows: Sequence[LongRow], table: LongTable) -> Chart | Non
         return None
     unit, turn = _axis(view, rows)
     x_name, x_unit, x_of = _abscissa(view, rows, table)
-    first, *others = _telling(view, rows) or ("",)
+    # The labels of `by` that tell rows apart; the first one always does
+    column = {"label": "method"}
+    first, *others = [
+        b for i, b in enumerate(texts(view.by))
+        if i == 0 or len({getattr(r, column.get(b, b)) for r in rows}) > 1
+    ] or [""]  # fmt: skip
     lines: dict[tuple[str, str], list[tuple[float, float, float | None]]] = {}
     levels = []
     for row in rows:
@@ -389,14 +377,6 @@ def _less(view: View, rows: Sequence[LongRow], table: LongTable) -> Iterator[Lon
         if row.value is not None and reference is not None:
             sd = row.sd if row.method == view.less else None
             yield row._replace(value=row.value - reference, sd=sd)
-
-
-def _telling(view: View, rows: Sequence[LongRow]) -> tuple[str, ...]:
-    """The labels of `by` that tell rows apart; the first one always does."""
-    by = texts(view.by)
-    column = {"label": "method"}
-    return tuple(b for i, b in enumerate(by)
-                 if i == 0 or len({getattr(r, column.get(b, b)) for r in rows}) > 1)  # fmt: skip
 
 
 def _axis(view: View, rows: Sequence[LongRow]) -> tuple[str, Callable[[float], float]]:
