@@ -44,7 +44,12 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
         if not _files(folder.resolve()):
             raise UsageError(f"--experiments {folder}: no experiment file (*.py) in this folder")
     found = {name_of(f): f for folder in searched_folders(start, named) for f in _files(folder)}
-    _tell_hidden(found)
+    # Warn of experiments of plug-ins whose names others have.
+    for plug_in in plug_ins("experiments"):
+        own = folder_of_experiments(plug_in)
+        for file in _files(own) if own else ():
+            if found[name_of(file)] != file:
+                left_out(plug_in, f"another experiment is called '{name_of(file)}'")
     if not found:
         raise UsageError(
             "no experiments/ folder here or in this project; give one with --experiments DIR"
@@ -54,27 +59,14 @@ def experiment_files(start: Path, named: Sequence[Path] = ()) -> dict[str, Path]
 
 def searched_folders(start: Path, named: Sequence[Path] = ()) -> tuple[Path, ...]:
     """The folders that experiments are looked for in; of two with one name the later is meant."""
-    own = (folder / "experiments" for folder in (_project(start), start))
-    further = (folder.resolve() for folder in named)
-    return tuple(dict.fromkeys((*_of_plug_ins(), shipped(), *own, *further)))
-
-
-def _of_plug_ins() -> list[Path]:
-    """The folders of experiments of plug-ins; `PACKAGE.experiments` is the name of one."""
-    found = {plug_in: folder_of_experiments(plug_in) for plug_in in plug_ins("experiments")}
-    for plug_in, folder in found.items():
+    plugged = {plug_in: folder_of_experiments(plug_in) for plug_in in plug_ins("experiments")}
+    for plug_in, folder in plugged.items():
         if folder is None:
             left_out(plug_in, f"there is no folder {plug_in.value}")
-    return [folder for folder in found.values() if folder is not None]
-
-
-def _tell_hidden(found: dict[str, Path]) -> None:
-    """Warn of experiments of plug-ins whose names others have."""
-    for plug_in in plug_ins("experiments"):
-        folder = folder_of_experiments(plug_in)
-        for file in _files(folder) if folder else ():
-            if found[name_of(file)] != file:
-                left_out(plug_in, f"another experiment is called '{name_of(file)}'")
+    of_plug_ins = (folder for folder in plugged.values() if folder is not None)
+    own = (folder / "experiments" for folder in (_project(start), start))
+    further = (folder.resolve() for folder in named)
+    return tuple(dict.fromkeys((*of_plug_ins, shipped(), *own, *further)))
 
 
 def folder_of_experiments(plug_in: PlugIn) -> Path | None:
@@ -134,11 +126,21 @@ def card(path: Path) -> Card:
         return Card(name_of(path), "", "", f"cannot be read: {error}")
     if not any(_names_experiment(node) for node in ast.walk(module)):
         return Card(name_of(path), "", "", "defines no EXPERIMENT")
-    if _is_of_older_form(module):
+    if any(k.arg == "parameters" for call in _declarations(module) for k in call.keywords):
         return Card(name_of(path), "", "", f"declares `parameters` in place of a scene, as older "
                     f"files did; write it anew: `validate new {name_of(path)} --from RECORDING "
                     "--force`")  # fmt: skip
-    texts = _spelt(module)
+    # Texts given to `EXPERIMENT = Experiment(...)`; those of the file's constants filled in.
+    texts, constants = dict[str, str](), dict[str, str]()
+    for node in module.body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+            name = node.targets[0].id
+            if name == "EXPERIMENT" and isinstance(node.value, ast.Call):
+                given = {k.arg: _text(k.value, constants) for k in node.value.keywords}
+                texts = {k: v for k, v in given.items() if k is not None and v is not None}
+                break
+            if (text := _text(node.value, constants)) is not None:
+                constants[name] = text
     docstring = (ast.get_docstring(module) or "").partition("\n")[0]
     title, needs = texts.get("title", docstring), texts.get("needs", "")
     return Card(name_of(path), title, texts.get("source", ""), needs=needs)
@@ -151,11 +153,6 @@ def _names_experiment(node: ast.AST) -> bool:
     return isinstance(node, ast.Name) and node.id == "EXPERIMENT"
 
 
-def _is_of_older_form(module: ast.Module) -> bool:
-    """Whether the experiment is declared by parameters of its own, of which a scene was built."""
-    return any(k.arg == "parameters" for call in _declarations(module) for k in call.keywords)
-
-
 def _declarations(module: ast.Module) -> list[ast.Call]:
     """`EXPERIMENT = Experiment(...)`."""
     return [
@@ -163,20 +160,6 @@ def _declarations(module: ast.Module) -> list[ast.Call]:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Call)
         and isinstance(node.targets[0], ast.Name) and node.targets[0].id == "EXPERIMENT"
     ]  # fmt: skip
-
-
-def _spelt(module: ast.Module) -> dict[str, str]:
-    """Texts given to `EXPERIMENT = Experiment(...)`; those of the file's constants filled in."""
-    constants: dict[str, str] = {}
-    for node in module.body:
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
-            name = node.targets[0].id
-            if name == "EXPERIMENT" and isinstance(node.value, ast.Call):
-                given = {k.arg: _text(k.value, constants) for k in node.value.keywords}
-                return {k: v for k, v in given.items() if k is not None and v is not None}
-            if (text := _text(node.value, constants)) is not None:
-                constants[name] = text
-    return {}
 
 
 def _text(node: ast.expr, constants: dict[str, str]) -> str | None:

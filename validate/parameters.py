@@ -111,12 +111,22 @@ def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Para
     """
     found: list[Parameter] = []
     for name, value, hint, meta in _members(settings):
-        path, default = f"{prefix}{name}", _default(settings, name, library)
+        path, default = f"{prefix}{name}", None
+        if is_dataclass(settings):
+            own = settings.__dataclass_fields__[name].default
+            default = getattr(library, name) if type(library) is type(settings) else own
+        # Names of parts, arrays, and parts of which there are none are no settings.
+        if isinstance(value, tuple) and get_origin(hint) is tuple:
+            is_setting = "unit" in meta and not _is_of_parts(hint)
+        else:
+            absent = value is None and is_dataclass(hint)
+            plain = not absent and (value is None or isinstance(value, str | int | float | tuple))
+            is_setting = plain and ("unit" in meta or isinstance(hint, type))
         if meta.get("part"):
             found += describe(value, prefix, default) if _branches(value) else ()
         elif _branches(value):
             found += describe(value, f"{path}.", default)
-        elif not _is_setting(value, hint, meta) or (name == "name" and not meta):
+        elif not is_setting or (name == "name" and not meta):
             continue
         else:
             unit, doc = meta.get("unit", "1"), meta.get("doc", "")
@@ -130,32 +140,9 @@ def describe(settings: Any, prefix: str = "", library: Any = None) -> tuple[Para
     return tuple(found)
 
 
-def _default(settings: Any, name: str, library: Any) -> Any:
-    """What a member is unless somebody gives it."""
-    if not is_dataclass(settings):
-        return None
-    if type(library) is type(settings):
-        return getattr(library, name)
-    return settings.__dataclass_fields__[name].default
-
-
-def _is_setting(value: Any, hint: Any, meta: Mapping[str, Any]) -> bool:
-    """Not names of parts, arrays, and parts of which there are none."""
-    if isinstance(value, tuple) and get_origin(hint) is tuple:
-        return "unit" in meta and not _is_of_parts(hint)
-    absent = value is None and is_dataclass(hint)
-    plain = not absent and (value is None or isinstance(value, str | int | float | tuple))
-    return plain and ("unit" in meta or isinstance(hint, type))
-
-
 def _is_of_parts(hint: Any) -> bool:
     """Whether a tuple's type is that of several parts."""
     return any(is_dataclass(kind) for kind in _kinds(get_args(hint)[0]))
-
-
-def _has_no_parts(value: Any, hint: Any) -> bool:
-    empty = isinstance(value, tuple) and not value
-    return empty and get_origin(hint) is tuple and _is_of_parts(hint)
 
 
 def _kinds(hint: Any) -> tuple[Any, ...]:
@@ -179,15 +166,6 @@ def _inner(settings: Any, name: str) -> Any:
     if isinstance(settings, tuple):
         return next(part for i, part in enumerate(settings) if _key(part, i) == name)
     return settings[name] if isinstance(settings, Mapping) else getattr(settings, name)
-
-
-def _with(settings: Any, new: Mapping[str, Any]) -> Any:
-    """A copy with other parts under these names."""
-    if isinstance(settings, tuple):
-        return tuple(new.get(_key(part, i), part) for i, part in enumerate(settings))
-    if isinstance(settings, Mapping):
-        return types.MappingProxyType({**settings, **new})
-    return replace(settings, **new) if new else settings
 
 
 def with_values(settings: Any, values: Mapping[str, str]) -> Any:
@@ -279,7 +257,9 @@ def _resolved(settings: Any, names: list[str], whole: bool = False) -> list[str]
     for name, value, hint, _ in members:
         if name != head:
             continue
-        if not rest and (whole or not (_branches(value) or _has_no_parts(value, hint))):
+        empty = isinstance(value, tuple) and not value
+        no_parts = empty and get_origin(hint) is tuple and _is_of_parts(hint)
+        if not rest and (whole or not (_branches(value) or no_parts)):
             return [head]
         inner = _resolved(value, rest, whole) if rest else None
         if inner:
@@ -360,7 +340,12 @@ def _set(settings: Any, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
     below: dict[str, list[tuple[list[str], str, Any]]] = {}
     for names, path, text in asked:
         below.setdefault(names[0], []).append((names[1:], path, text))
-    return _with(settings, {head: _member(settings, head, inner) for head, inner in below.items()})
+    new = {head: _member(settings, head, inner) for head, inner in below.items()}
+    if isinstance(settings, tuple):
+        return tuple(new.get(_key(part, i), part) for i, part in enumerate(settings))
+    if isinstance(settings, Mapping):
+        return types.MappingProxyType({**settings, **new})
+    return replace(settings, **new) if new else settings
 
 
 def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]]) -> Any:
@@ -370,9 +355,9 @@ def _member(settings: Any, head: str, asked: Sequence[tuple[list[str], str, Any]
     if not isinstance(text, str):
         return text
     unit, _ = _leaf(settings, [head])
-    if text.lower() in _OPEN and _may_open(settings, head):
-        return None
     hint, meta = next((hint, meta) for n, _, hint, meta in _members(settings) if n == head)
+    if text.lower() in _OPEN and meta.get("opened"):
+        return None
     return parsed(_with_more(hint, meta, text), path, text, unit)
 
 
@@ -380,10 +365,6 @@ def _with_more(hint: Any, meta: Mapping[str, Any], text: Any) -> Any:
     """The type of a field with the choices of plug-ins, where the text is none of its own."""
     more = meta.get("more")
     return hint if more is None or text in get_args(hint) else Literal[(*get_args(hint), *more())]
-
-
-def _may_open(settings: Any, name: str) -> bool:
-    return any(member == name and meta.get("opened") for member, _, _, meta in _members(settings))
 
 
 def parsed(hint: Any, path: str, text: str, unit: str) -> Any:
@@ -408,15 +389,11 @@ def parsed(hint: Any, path: str, text: str, unit: str) -> Any:
             raise UsageError(f"{path}={text}: expected true or false")
         return text.lower() == "true"
     if hint is int:
-        return _whole(path, text)
+        try:
+            return int(text)
+        except ValueError:
+            raise UsageError(f"{path}={text}: not a whole number") from None
     return _number(path, text, unit) if hint is float else text
-
-
-def _whole(path: str, text: str) -> int:
-    try:
-        return int(text)
-    except ValueError:
-        raise UsageError(f"{path}={text}: not a whole number") from None
 
 
 def _number(path: str, text: str, unit: str) -> float:

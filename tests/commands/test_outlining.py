@@ -22,7 +22,7 @@ from validate.recording.types import Frames, Recording, Source
 
 pytestmark = pytest.mark.usefixtures("decoded_here")
 
-# private: _read, _scale, _shape: called alone, case by case.
+# private: _read, _shape: called alone, case by case.
 
 SIDE = 0.2e-3  # m of a pixel
 SHAPE = (110, 150)
@@ -372,12 +372,22 @@ def test_a_label_a_limit_and_a_unit_that_do_not_fit_are_refused(
     (tmp_path / "a.csv").write_text("frame,x,y\n")
     with pytest.raises(UsageError, match=r"--label cyst: a.csv has no labels"):
         third_party_outlines._read(tmp_path / "a.csv", frames, "cyst")
+    (tmp_path / "a.csv").write_text("frame,x,y\n0,0,0\n0,4,0\n0,0,4\n")
     with pytest.raises(UsageError, match=r"unit kg of a.csv: expected px"):
-        third_party_outlines._scale(tmp_path / "a.csv", frames, "kg")
-    assert third_party_outlines._scale(tmp_path / "a.csv", frames, "mm").tolist() == [1e-3, 1e-3]
-    assert third_party_outlines._scale(tmp_path / "a.npy", frames, "mm").tolist() == [SIDE, SIDE]
+        third_party_outlines.foreign_outlines(tmp_path / "a.csv", frames, "images", 1e-4, "kg")
+    drawn = third_party_outlines.foreign_outlines(
+        tmp_path / "a.csv", frames, "images", 1e-4, "mm"
+    ).outlines[0]
+    assert drawn.max() == pytest.approx(4e-3, rel=1e-12)
+    masks = np.zeros((3, *frames.images[0].shape), dtype=np.uint8)
+    masks[:, 10:20, 10:20] = 1
+    np.save(tmp_path / "a.npy", masks)
+    masked = third_party_outlines.foreign_outlines(
+        tmp_path / "a.npy", frames, "images", 1e-4, "mm"
+    ).outlines[0]
+    assert np.ptp(masked, axis=0) == pytest.approx([10 * SIDE, 10 * SIDE], rel=1e-12)
     monkeypatch.setattr(third_party_outlines, "MAX_FILE", 5)
-    with pytest.raises(RecordingError, match=r"a.csv: 10 bytes, limit 5"):
+    with pytest.raises(RecordingError, match=r"a.csv: 28 bytes, limit 5"):
         third_party_outlines._read(tmp_path / "a.csv", frames, "")
     shapes = {"shapes": [{"label": "a", "points": []}, {"label": "a", "points": []}]}
     with pytest.raises(RecordingError, match=r"a.json: 2 polygons"):

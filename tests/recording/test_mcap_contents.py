@@ -37,8 +37,7 @@ from validate.recording.mcap.records import (
 )
 from validate.recording.mcap.schemas import by_name
 
-# private: _guarded, _packed, _points, _protobuf: called alone, case by case.
-# private: _ros2: replaced, to bring a case about.
+# private: _guarded, _packed, _points: called alone, case by case.
 
 ReportAdditions = tuple[str, dict[str, Any]]
 NO_FIELD = ("__msgtype__", "structure_needs_at_least_one_member")
@@ -210,11 +209,12 @@ NO_SCHEMA = Schema(1, "x/msg/X", "ros2msg", b"")
 def test_encodings_that_nothing_here_decodes_report_it(monkeypatch: pytest.MonkeyPatch) -> None:
     channel = Channel(1, 1, "/x", "cdr", {})
     assert decoder_of(None, channel) == "no decoder for '/cdr'"
-    monkeypatch.setattr(decoders, "_ros2", refusing(ImportError("no", name="mcap_ros2")))
+    library = "mcap_ros2.decoder.DecoderFactory"
+    monkeypatch.setattr(library, refusing(ImportError("no", name="mcap_ros2")))
     assert decoder_of(NO_SCHEMA, channel) == (
         f"the library 'mcap_ros2' that reads it is not installed; {install_command()}"
     )
-    monkeypatch.setattr(decoders, "_ros2", refusing(SyntaxError("line 3\n of it")))
+    monkeypatch.setattr(library, refusing(SyntaxError("line 3\n of it")))
     assert decoder_of(NO_SCHEMA, channel) == "its schema cannot be parsed (line 3 of it)"
 
 
@@ -229,10 +229,11 @@ def test_a_library_without_a_decoder_is_one_line(monkeypatch: pytest.MonkeyPatch
     nothing = SimpleNamespace(decoder_for=lambda *_: None)
     monkeypatch.setattr("mcap_ros2.decoder.DecoderFactory", lambda: nothing)
     monkeypatch.setattr("mcap_protobuf.decoder.DecoderFactory", lambda: nothing)
-    with pytest.raises(RecordingError, match="no ROS 2 message definition"):
-        decoders._ros2(NO_SCHEMA)
-    with pytest.raises(RecordingError, match="no Protobuf schema"):
-        decoders._protobuf(NO_SCHEMA)
+    said = decoder_of(NO_SCHEMA, Channel(1, 1, "/x", "cdr", {}))
+    assert said == "its schema cannot be parsed (no ROS 2 message definition)"
+    schema = Schema(1, "X", "protobuf", b"")
+    said = decoder_of(schema, Channel(1, 1, "/x", "protobuf", {}))
+    assert said == "its schema cannot be parsed (no Protobuf schema)"
 
 
 def test_damaged_messages_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,16 +1,17 @@
 """Which rows of an export hold units, and which numbers."""
 
 import re
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from validate.errors import RecordingError, UsageError
-from validate.recording.tables import columns as stepped
 from validate.recording.tables import specimens, table
-from validate.recording.tables.columns import Said
+from validate.recording.tables.columns import Said, timed_pick
 from validate.recording.tables.table import is_data, is_row, is_unit_row
 
-# private: _cells, _number, _step: called alone, case by case.
+# private: _cells, _number: called alone, case by case.
 
 
 @pytest.mark.parametrize(
@@ -75,8 +76,14 @@ def test_a_number_of_a_header_has_either_sign_but_where_it_may_group(
      ("0.1", None)],
 )  # fmt: skip
 def test_a_step_of_time_has_its_unit(text: str, expected: tuple[float, str] | None) -> None:
+    three: Any = SimpleNamespace(lines=(5, 6, 7))
     if expected is None:
         with pytest.raises(UsageError, match=f"--map time=every:{re.escape(text)}: expected a st"):
-            stepped._step(Said("every", text, None))
+            timed_pick("time", three, Said("every", text, None))
     else:
-        assert stepped._step(Said("every", text, None)) == expected
+        step, unit = expected
+        found = timed_pick("time", three, Said("every", text, None))
+        assert (found.unit, found.values.tolist()) == (
+            unit,
+            [k * step * {"s": 1.0, "ms": 1e-3}[unit] for k in range(3)],
+        )

@@ -294,7 +294,20 @@ def averaged(logs: Sequence[Recording], labels: Sequence[str], name: str) -> Rec
     }  # fmt: skip
     share = rms(sd[:, None]) / rms(mean[:, None])
     told = _told(votes[-1], labels, share, paths, names, float(d[-1]))
-    return _recording(name, logs, names, signals, {"specimen": sizes, **told})
+    stamps = {k: np.round(s.t * 1e9).astype(np.int64) for k, s in signals.items()}
+    records = {
+        f"{key}/{own}": record
+        for own, log in zip(names, logs, strict=True)
+        for key, record in log.metadata.items()
+    }
+    return Recording(
+        name=name,
+        source=Source(" + ".join(log.source.path for log in logs), "", 0, "mean of repeats"),
+        t0_ns=0,
+        signals=signals,
+        clock={k: clock_of(k, None, ns, ns) for k, ns in stamps.items()},
+        metadata={"specimen": sizes, **told, **records},
+    )
 
 
 def _alike(logs: Sequence[Recording]) -> tuple[TestKind, Record]:
@@ -369,26 +382,3 @@ def _told(
         SHARE: repr(share),
     }
     return {REPEATS: record, ASSUMED: about}
-
-
-def _recording(
-    name: str,
-    logs: Sequence[Recording],
-    names: Sequence[str],
-    signals: Mapping[str, Signal],
-    records: Mapping[str, Record],
-) -> Recording:
-    stamps = {k: np.round(s.t * 1e9).astype(np.int64) for k, s in signals.items()}
-    own = {
-        f"{key}/{log_name}": record
-        for log_name, log in zip(names, logs, strict=True)
-        for key, record in log.metadata.items()
-    }
-    return Recording(
-        name=name,
-        source=Source(" + ".join(log.source.path for log in logs), "", 0, "mean of repeats"),
-        t0_ns=0,
-        signals=signals,
-        clock={k: clock_of(k, None, ns, ns) for k, ns in stamps.items()},
-        metadata={**records, **own},
-    )

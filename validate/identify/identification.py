@@ -140,43 +140,29 @@ class Identification:
             tuple(self.space.value(i, float(x)) for x in at),
             tuple((rise[first] / self.misfit).tolist()), (),
         )  # fmt: skip
-        found = (*self._wide(i, bare), *self._at_bound(i, bare), *self._elsewhere(i, below, above))
-        return Profiled(**{**vars(bare), "findings": found})
-
-    def _wide(self, i: int, e: Profiled) -> tuple[str, ...]:
-        r = self.space.ranges[i]
-        if r.low > 0:
-            wide = e.high / e.low > FACTOR
-            words = f"its 95 % interval spans a factor {e.high / e.low:.3g}"
-        else:
-            share = (e.high - e.low) / (r.high - r.low)
-            wide, words = (
-                share > SHARE,
-                f"its 95 % interval spans {100 * share:.0f} % of the range searched",
-            )
-        if e.low_open and e.high_open:
-            return ("its 95 % interval is the whole range searched",)
-        return (words,) if wide else ()
-
-    def _at_bound(self, i: int, e: Profiled) -> tuple[str, ...]:
-        x, r = self.best.x[i], self.space.ranges[i]
-        if _EDGE < x < 1 - _EDGE:
-            return ()
-        return (f"the optimum lies at a bound, {r.low if x <= _EDGE else r.high:.6g}",)
-
-    def _elsewhere(self, i: int, below: Side, above: Side) -> tuple[str, ...]:
-        near = _EDGE
+        r, x = self.space.ranges[i], self.best.x[i]
+        findings = []
+        if bare.low_open and bare.high_open:
+            findings.append("its 95 % interval is the whole range searched")
+        elif r.low > 0:
+            if high / low > FACTOR:
+                findings.append(f"its 95 % interval spans a factor {high / low:.3g}")
+        elif (share := (high - low) / (r.high - r.low)) > SHARE:
+            findings.append(f"its 95 % interval spans {100 * share:.0f} % of the range searched")
+        if not _EDGE < x < 1 - _EDGE:
+            bound = r.low if x <= _EDGE else r.high
+            findings.append(f"the optimum lies at a bound, {bound:.6g}")
         others = [
             f for f in self.fits
-            if self._as_good(f) and not below.end - near <= f.x[i] <= above.end + near
+            if self._as_good(f) and not below.end - _EDGE <= f.x[i] <= above.end + _EDGE
         ]  # fmt: skip
-        if not others:
-            return ()
-        ends = ", ".join(f"{self.space.value(i, float(f.x[i])):.4g}" for f in others[:3])
-        return (
-            f"{len(others)} of {len(self.fits)} starts end at other values with an equally "
-            f"good fit: {ends}",
-        )
+        if others:
+            ends = ", ".join(f"{self.space.value(i, float(f.x[i])):.4g}" for f in others[:3])
+            findings.append(
+                f"{len(others)} of {len(self.fits)} starts end at other values with an equally "
+                f"good fit: {ends}"
+            )
+        return Profiled(**{**vars(bare), "findings": tuple(findings)})
 
 
 def identify(space: Space, evaluates: Evaluates, starts: int = 10, seed: int = 1) -> Identification:

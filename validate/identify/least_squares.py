@@ -137,19 +137,16 @@ class CalledOnce:
     def __call__(self, x: Floats) -> Floats:
         """Raises what the first point raises; later ones that raise are only bad."""
         key = np.asarray(x, dtype=np.float64).tobytes()
-        if key not in self._known:
-            self.calls += 1
-            self._known[key] = self._guarded(x)
-        return self._known[key]
-
-    def _guarded(self, x: Floats) -> Floats:
+        if key in self._known:
+            return self._known[key]
+        self.calls += 1
         try:
             found = self._residual(x)
         except ValidateError as error:
             if self._penalty is None:
                 raise
             self.failure = " ".join(str(error).split())
-            return self._penalty
+            found = self._penalty
         if self._penalty is None:
             if len(found) == 0:
                 raise ComparisonError(
@@ -163,6 +160,7 @@ class CalledOnce:
                 f"{len(self._penalty)} residuals at the start, {len(found)} later: the "
                 "compared data must not depend on the identified parameters"
             )
+        self._known[key] = found
         return found
 
 
@@ -332,12 +330,40 @@ def side(residual: Residual, best: Fit, i: int, sign: int, scale: float = 1.0) -
         rise.append(walk.rise(best.x[i] + sign * step))
         if abs(rise[-1] - wanted) <= _WITHIN * wanted or (step >= room and rise[-1] < wanted):
             break
-        step = _next(np.array(at), np.array(rise), wanted, reach, room)
-    end, is_open = _end(np.array(at), np.array(rise), wanted, room)
-    order = np.argsort(at)
+        # The next distance: sqrt(rise) is nearly straight; between those that hold the end, if two.
+        d, r = np.array(at), np.array(rise)
+        z, target = np.sqrt(np.maximum(r, 0.0)), float(np.sqrt(wanted))
+        below, above = d[r < wanted], d[r >= wanted]
+        if len(above) == 0:
+            far, last = d.max(), z[d.argmax()]
+            ahead = far * target / last if last > 0 else 2 * far
+            step = float(min(max(ahead, far + 0.1 * reach), 3 * far, room))
+        else:
+            high = above.min()
+            low = below[below < high].max()
+            z_low, z_high = z[d == low][0], z[d == high][0]
+            straight = z_high > z_low and len(d) <= _STRAIGHT
+            share = (target - z_low) / (z_high - z_low) if straight else 0.5
+            step = float(low + min(max(share, 0.05), 0.95) * (high - low))
+    # Distance to the interval's end, on the line of sqrt(rise) through the two points nearest to
+    # it, and whether it is only the bound. At a jump, the points on both sides.
+    d, r = np.array(at), np.array(rise)
+    z, target = np.sqrt(np.maximum(r, 0.0)), float(np.sqrt(wanted))
+    if r.max() < (1 - _WITHIN) * wanted:
+        end, is_open = room, True
+    else:
+        b = int(np.argmin(np.abs(r - wanted)))
+        others = [k for k in range(len(d)) if z[k] != z[b]]
+        if abs(r[b] - wanted) > _WITHIN * wanted:  # a jump, as where nothing can be simulated
+            b = min(np.flatnonzero(r >= wanted).tolist(), key=lambda k: d[k])
+            others = [k for k in range(len(d)) if r[k] < wanted and d[k] < d[b]]
+        a = min(others, key=lambda k: abs(d[k] - d[b]))
+        end = d[b] + (target - z[b]) * (d[b] - d[a]) / (z[b] - z[a])
+        end, is_open = float(min(end, room)), bool(end > room)
+    order = np.argsort(d)
     return Side(
-        i, sign, best.x[i] + sign * np.array(at)[order], np.array(rise)[order],
-        float(best.x[i] + sign * end), is_open, walk.lowest[1], walk.lowest[0],
+        i, sign, best.x[i] + sign * d[order], r[order], float(best.x[i] + sign * end), is_open,
+        walk.lowest[1], walk.lowest[0],
     )  # fmt: skip
 
 
@@ -381,36 +407,3 @@ class _Outwards:
         if rise < self.lowest[0]:
             self.lowest = rise, at(y)
         return rise
-
-
-def _next(at: Floats, rise: Floats, wanted: float, reach: float, room: float) -> float:
-    """The next distance: sqrt(rise) is nearly straight; between those that hold the end, if two."""
-    z, target = np.sqrt(np.maximum(rise, 0.0)), np.sqrt(wanted)
-    below, above = at[rise < wanted], at[rise >= wanted]
-    if len(above) == 0:
-        far = at.max()
-        last = z[at == far][0]
-        ahead = far * target / last if last > 0 else 2 * far
-        return float(min(max(ahead, far + 0.1 * reach), 3 * far, room))
-    a = below[below < above.min()].max()
-    b = above.min()
-    za, zb = z[at == a][0], z[at == b][0]
-    straight = zb > za and len(at) <= _STRAIGHT
-    share = (target - za) / (zb - za) if straight else 0.5
-    return float(a + min(max(share, 0.05), 0.95) * (b - a))
-
-
-def _end(at: Floats, rise: Floats, wanted: float, room: float) -> tuple[float, bool]:
-    """Distance to the interval's end, on the line of sqrt(rise) through the two points nearest to
-    it, and whether it is only the bound. At a jump, the points on both sides."""
-    z, target = np.sqrt(np.maximum(rise, 0.0)), float(np.sqrt(wanted))
-    if rise.max() < (1 - _WITHIN) * wanted:
-        return room, True
-    b = int(np.argmin(np.abs(rise - wanted)))
-    others = [k for k in range(len(at)) if z[k] != z[b]]
-    if abs(rise[b] - wanted) > _WITHIN * wanted:  # a jump, as where nothing can be simulated
-        b = min(np.flatnonzero(rise >= wanted).tolist(), key=lambda k: at[k])
-        others = [k for k in range(len(at)) if rise[k] < wanted and at[k] < at[b]]
-    a = min(others, key=lambda k: abs(at[k] - at[b]))
-    end = at[b] + (target - z[b]) * (at[b] - at[a]) / (z[b] - z[a])
-    return float(min(end, room)), bool(end > room)

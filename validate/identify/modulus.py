@@ -166,7 +166,10 @@ def loading(recording: Recording, test: TestKind = "compression") -> Log:
     """
     require_test(recording, test)
     moved, force = (_samples(recording, *s) for s in (("displacement", "m"), ("force", "N")))
-    sign = _pulled(moved.y[:, 0]) if test == "tension" else 1.0
+    sign = 1.0
+    if test == "tension":  # imported logs have compression positive
+        pulled = moved.y[:, 0] - moved.y[0, 0]
+        sign = float(np.sign(pulled[np.abs(pulled).argmax()])) or 1.0
     if len(moved.t) == len(force.t) and np.abs(moved.t - force.t).max(initial=0.0) <= SAME:
         return Log(moved.t, sign * moved.y[:, 0], sign * force.y[:, 0], 0.0)
     shown, squared = interpolated(force.t, force.y, moved.t)
@@ -179,12 +182,6 @@ def loading(recording: Recording, test: TestKind = "compression") -> Log:
         )
     error = float(np.sqrt(squared[0]))
     return Log(moved.t[both], sign * moved.y[both, 0], sign * shown[both, 0], error)
-
-
-def _pulled(d: Floats) -> float:
-    """The sign of the largest displacement: imported logs have compression positive."""
-    moved = d - d[0]
-    return float(np.sign(moved[np.abs(moved).argmax()])) or 1.0
 
 
 def stated_test(recording: Recording) -> str:

@@ -67,7 +67,13 @@ class Ringing:
         w, d = (float(x) for x in found.x)
         if not (found.success and 0.5 * w0 < w < 2 * w0):
             raise ComparisonError(f"no ringing near {f0:.2f} Hz was found: {found.message}")
-        sd_w, sd_d = _spread(found.fun, np.asarray(found.jac))
+        # Standard deviations of w and d (1/s each) of residuals whose neighbours are correlated.
+        left, slope = found.fun, np.asarray(found.jac)
+        squares = float(left @ left)
+        r = float(np.clip(left[1:] @ left[:-1] / squares, 0.0, 1.0)) if squares else 0.0
+        freedom = max(len(left) * (1 - r) / (1 + r) - _LINEAR - 2, 1.0)
+        variances = squares / freedom * np.diag(np.linalg.pinv(slope.T @ slope))
+        sd_w, sd_d = np.sqrt(variances).tolist()
         whole = np.hypot(w, d)
         return cls(
             w / (2 * np.pi), sd_w / (2 * np.pi), d / whole, sd_d / whole, w * t[-1] / (2 * np.pi)
@@ -98,15 +104,6 @@ def _left(p: Floats, t: Floats, y: Floats) -> Floats:
     )
     factors = np.linalg.lstsq(basis, y, rcond=None)[0]
     return np.asarray(basis @ factors - y)
-
-
-def _spread(left: Floats, slope: Floats) -> tuple[float, float]:
-    """Standard deviations of w and d (1/s each)."""
-    squares = float(left @ left)
-    r = float(np.clip(left[1:] @ left[:-1] / squares, 0.0, 1.0)) if squares else 0.0
-    freedom = max(len(left) * (1 - r) / (1 + r) - _LINEAR - 2, 1.0)
-    w, d = np.sqrt(squares / freedom * np.diag(np.linalg.pinv(slope.T @ slope))).tolist()
-    return w, d
 
 
 FRACTION = 1 / 3  # of the first mode: statics is off by a tenth of what moves there
@@ -254,7 +251,16 @@ def recorded_motion(t: Floats, moved: Mapping[str, Floats], noise: float = 0.0) 
         f, amplitude = Ringing.spectrum(*_even(t, y))
         frequency, resolution = float(f[amplitude.argmax()]), float(1 / (t[-1] - t[0]))
     coarse = noise > 0 and frequency * usual * _SMOOTH > 1
-    found, rings = noise if coarse else max(noise, _noise(y)), _ringing(t, y)
+    # How it rings after its largest excursion.
+    after = int(np.abs(y - np.median(y)).argmax())
+    try:
+        rings = Ringing.of(*_even(t[after:], y[after:]))
+    except (ComparisonError, ValueError, np.linalg.LinAlgError):
+        rings = None
+    found = noise
+    if not coarse and len(y) >= _FEWEST:
+        # From fourth differences: a smooth motion has small ones.
+        found = max(noise, float(1.4826 * np.median(np.abs(np.diff(y, n=4))) / np.sqrt(70)))
     starts = _starts(t, y, found)
     # Until when it stays within a hundredth of the motion about its start, or within noise.
     first = int((np.abs(y - y[0]) > max(6 * found, _STILL * np.ptp(y))).argmax())
@@ -283,13 +289,6 @@ def _even(t: Floats, y: Floats) -> tuple[Floats, Floats]:
     """On as many evenly spaced times."""
     at = np.linspace(t[0], t[-1], len(t))
     return at, np.interp(at, t, y)
-
-
-def _noise(y: Floats) -> float:
-    """m, from fourth differences: a smooth motion has small ones."""
-    if len(y) < _FEWEST:
-        return 0.0
-    return float(1.4826 * np.median(np.abs(np.diff(y, n=4))) / np.sqrt(70))
 
 
 def _starts(t: Floats, y: Floats, noise: float) -> float:
@@ -327,12 +326,3 @@ def _released(t: Floats, y: Floats, starts: float, rings: Ringing) -> float:
     at = np.arctan2(w * s - d * p, w * p + d * s) / w
     at = (at + 0.25 / rings.frequency) % (0.5 / rings.frequency) - 0.25 / rings.frequency
     return float(max(starts + at, t[0]))
-
-
-def _ringing(t: Floats, y: Floats) -> Ringing | None:
-    """How it rings after its largest excursion."""
-    after = int(np.abs(y - np.median(y)).argmax())
-    try:
-        return Ringing.of(*_even(t[after:], y[after:]))
-    except (ComparisonError, ValueError, np.linalg.LinAlgError):
-        return None

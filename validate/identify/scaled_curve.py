@@ -177,10 +177,30 @@ def fit_scaled(
     p = 2 if shifted else 1
     if len(d) <= p:
         raise ComparisonError(f"{len(d)} samples of force to fit {p} parameters to; record more")
+
+    def left(at: float) -> tuple[float, float]:
+        """Sum of squares and scale at this shift."""
+        scale = _scale(curve, d - at, force)
+        off = force - scale * curve(d - at)
+        return float(off @ off), scale
+
+    # Gauss-Newton with the scale eliminated, steps halved while they worsen.
     shift = start if shifted else 0.0
-    scale = _scale(curve, d - shift, force)
-    if shifted:
-        shift, scale = _shifted(curve, d, force, shift)
+    square, scale = left(shift)
+    for _ in range(_STEPS if shifted else 0):
+        J = np.stack([curve(d - shift), -scale * curve.slope(d - shift)], axis=1)
+        size = np.linalg.norm(J, axis=0)
+        step = float(np.linalg.lstsq(J / size, force - scale * J[:, 0], rcond=None)[0][1] / size[1])
+        for _ in range(_HALVINGS):
+            there, other = left(shift + step)
+            if there <= square:
+                break
+            step /= 2
+        else:
+            break
+        shift, scale, square = shift + step, other, there
+        if abs(step) <= _CONVERGED * np.ptp(d):
+            break
     if not scale > 0:
         raise ComparisonError(
             f"the force fitted over {len(d)} samples falls as the load rises (scale {scale:.3g}); "
@@ -206,32 +226,6 @@ def _fitted(J: Floats, scale: float, shift: float, residual: Floats, sd: float) 
     return ScaledFit(
         scale, shift, covariance, residual, noise, times, inf if sd > seen else freedom
     )
-
-
-def _shifted(curve: UnitCurve, d: Floats, force: Floats, shift: float) -> tuple[float, float]:
-    """Shift m and scale: Gauss-Newton with the scale eliminated, steps halved while they worsen."""
-
-    def left(at: float) -> tuple[float, float]:
-        scale = _scale(curve, d - at, force)
-        off = force - scale * curve(d - at)
-        return float(off @ off), scale
-
-    square, scale = left(shift)
-    for _ in range(_STEPS):
-        J = np.stack([curve(d - shift), -scale * curve.slope(d - shift)], axis=1)
-        size = np.linalg.norm(J, axis=0)
-        step = float(np.linalg.lstsq(J / size, force - scale * J[:, 0], rcond=None)[0][1] / size[1])
-        for _ in range(_HALVINGS):
-            there, other = left(shift + step)
-            if there <= square:
-                break
-            step /= 2
-        else:
-            break
-        shift, scale, square = shift + step, other, there
-        if abs(step) <= _CONVERGED * np.ptp(d):
-            break
-    return shift, scale
 
 
 def fit_proportional(f: Floats, force: Floats, *, sd: float = 0.0) -> ScaledFit:

@@ -63,6 +63,17 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
         f"{i + 1}": f"{r.name}: {', '.join(r.streams)}; {r.source.path} sha256 {r.source.sha256}"
         for i, r in enumerate(recordings)
     }
+    values: dict[str, list[tuple[str, Record]]] = {}
+    for recording in recordings:
+        for key, record in recording.metadata.items():
+            values.setdefault(key, []).append((recording.name, record))
+    records: dict[str, Record] = {}
+    for key, given in values.items():
+        alike = all(dict(record) == dict(given[0][1]) for _, record in given)
+        single = alike and key != PROVENANCE
+        for i, (origin, record) in enumerate(given):
+            full = key if single else f"{key}/{origin}"
+            records[full if full not in records or single else f"{full}#{i + 1}"] = record
     return Recording(
         name=name,
         source=Source(" + ".join(r.source.path for r in recordings), "", 0, "merged"),
@@ -70,23 +81,8 @@ def merge(recordings: Sequence[Recording], name: str) -> Recording:
         **by_kind({k: s for r in parts for k, s in r.streams.items()}),
         clock={k: c for r in parts for k, c in r.clock.items()},
         unread={k: why for r in parts for k, why in r.unread.items()},
-        metadata={**_records(recordings), "merged": origins},
+        metadata={**records, "merged": origins},
     )
-
-
-def _records(recordings: Sequence[Recording]) -> dict[str, Record]:
-    values: dict[str, list[tuple[str, Record]]] = {}
-    for recording in recordings:
-        for name, record in recording.metadata.items():
-            values.setdefault(name, []).append((recording.name, record))
-    found: dict[str, Record] = {}
-    for name, given in values.items():
-        alike = all(dict(record) == dict(given[0][1]) for _, record in given)
-        for i, (origin, record) in enumerate(given):
-            single = alike and name != PROVENANCE
-            key = name if single else f"{name}/{origin}"
-            found[key if key not in found or single else f"{key}#{i + 1}"] = record
-    return found
 
 
 # -------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ so is a file that stops short, as if its writer was ended; only other damage is 
 """
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -143,7 +144,11 @@ class Inspection:
         topics = [
             _topic(verified, n, c, seen.channels.get(n)) for n, c in verified.channels.items()
         ]
-        return _inspection(verified, topics, [*found, *_chained(path, verified)])
+        # What contradicts of the poses, which are read once more for it.
+        if any(c.topic.endswith(f"/{ROTATION}") for c in verified.channels.values()):
+            with suppress(RecordingError):  # reported where the stream was inspected
+                found += list(chain_faults(read_recording(path)))
+        return _inspection(verified, topics, found)
 
 
 def inspect_file(path: Path, kind: str | None, options: Options) -> Inspection:
@@ -215,16 +220,6 @@ def _unread_topic(name: str, why: str) -> Topic:
     return Topic(name, f"not read: {why}", "", "", "", 0, None, None, "", "", None)
 
 
-def _chained(path: Path, verified: Verified) -> list[str]:
-    """What contradicts of the poses, which are read once more for it."""
-    if not any(c.topic.endswith(f"/{ROTATION}") for c in verified.channels.values()):
-        return []
-    try:
-        return list(chain_faults(read_recording(path)))
-    except RecordingError:
-        return []  # told where it was inspected
-
-
 def _inspection(
     verified: Verified, topics: list[tuple[Topic, list[str]]], defects: list[str]
 ) -> Inspection:
@@ -245,7 +240,12 @@ def _inspection(
             if record.name.startswith(CLOCK_OFFSET)
         ),
         facts=(
-            *_assumed(verified),
+            *(  # what was assumed in reading the file that a recording was made of
+                f"{key}: {text}"
+                for record in verified.metadata
+                if record.name.split("/")[0] == ASSUMED
+                for key, text in record.values.items()
+            ),
             *(
                 f"attachment {a.name}: {a.media_type or 'no media type'}, {a.size} bytes"
                 for a in verified.attachments
@@ -254,22 +254,27 @@ def _inspection(
     )
 
 
-def _assumed(verified: Verified) -> list[str]:
-    """What was assumed in reading the file that a recording was made of."""
-    return [
-        f"{key}: {text}"
-        for record in verified.metadata
-        if record.name.split("/")[0] == ASSUMED
-        for key, text in record.values.items()
-    ]
-
-
 def _topic(
     verified: Verified, number: int, channel: Channel, seen: ChannelSeen | None
 ) -> tuple[Topic, list[str]]:
     schema = verified.schemas.get(channel.schema_id)
     log, publish = verified.log_ns[number], verified.publish_ns[number]
-    stamps, defects = _content(verified, seen, publish)
+    # Stamps of a channel of ours where all its messages can be read, and what is wrong in them.
+    stamps: Ints | None = None
+    defects = []
+    if seen is not None and len(publish):
+        try:
+            read_ns = seen.stamps_ns()
+            # One that stopped at a limit has none: the file's defects name the limit.
+            if seen.count == len(publish):
+                stamps = read_ns
+                stream = seen.stream(
+                    publish if stamps is None else stamps, by_name(verified.metadata)
+                )
+                if odd := odd_stream(stream):
+                    defects = [f"{channel.topic!r}: {odd}"]
+        except RecordingError as error:
+            defects = [str(error)]
     times = publish if stamps is None else stamps
     clock = clock_of(channel.topic, stamps, publish, log) if len(publish) else None
     first = seen.first if seen else None
@@ -292,25 +297,6 @@ def _topic(
     )
     silent = clock is None and verified.header.profile == _ROS2  # it declares what it could record
     return topic, [*defects, *([] if silent else _clock_defects(channel.topic, clock, log))]
-
-
-def _content(
-    verified: Verified, seen: ChannelSeen | None, publish: Ints
-) -> tuple[Ints | None, list[str]]:
-    """Stamps of a channel of ours where all its messages can be read, and what is wrong in them."""
-    if seen is None or not len(publish):
-        return None, []
-    stamps: Ints | None = None
-    try:
-        stamps = seen.stamps_ns()
-        if seen.count != len(publish):
-            return None, []  # stopped at a limit, which the file's defects name
-        times = publish if stamps is None else stamps
-        stream = seen.stream(times, by_name(verified.metadata))
-    except RecordingError as error:
-        return stamps, [str(error)]
-    odd = odd_stream(stream)
-    return stamps, [f"{seen.channel.topic!r}: {odd}"] if odd else []
 
 
 def _clock_defects(topic: str, clock: Clock | None, log_ns: Ints) -> list[str]:

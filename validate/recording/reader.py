@@ -75,24 +75,20 @@ class Reader:
     general: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "read", _guarded(self.read, self.largest, self.options))
+        read = self.read
 
+        @wraps(read)
+        def guarded(path: Path, options: Options) -> Recording:
+            require_readable(path, self.largest)
+            require_known(options, self.options)
+            try:
+                return read(path, options)
+            except RecordingError as error:
+                if path.name in error.args[0]:
+                    raise
+                raise RecordingError(f"{path.name}: {error}") from error
 
-def _guarded(
-    read: Callable[[Path, Options], Recording], largest: int, known: tuple[MapOption, ...]
-) -> Callable[[Path, Options], Recording]:
-    @wraps(read)
-    def guarded(path: Path, options: Options) -> Recording:
-        require_readable(path, largest)
-        require_known(options, known)
-        try:
-            return read(path, options)
-        except RecordingError as error:
-            if path.name in error.args[0]:
-                raise
-            raise RecordingError(f"{path.name}: {error}") from error
-
-    return guarded
+        object.__setattr__(self, "read", guarded)
 
 
 def require_readable(path: Path, largest: int) -> None:

@@ -189,17 +189,14 @@ def recognised(path: Path) -> Reader:
             raise UsageError(said)
         if recognises(reader, path):
             return _shielded(reader)
-    raise UsageError(f"{path}: {_unknown(path)}")
-
-
-def _unknown(path: Path) -> str:
-    """What a file is that no reader recognises: a folder, empty, text or other bytes."""
     names = ", ".join(r.name for r in READERS)
     if path.is_dir():
-        return f"a folder of unknown format; name a file, or the format with --as ({names})"
+        raise UsageError(
+            f"{path}: a folder of unknown format; name a file, or the format with --as ({names})"
+        )
     size = path.stat().st_size
     if size == 0:
-        return "the file is empty (0 bytes); record or copy it again"
+        raise UsageError(f"{path}: the file is empty (0 bytes); record or copy it again")
     start = head(path)
     # Printable UTF-8, cut anywhere
     try:
@@ -208,9 +205,9 @@ def _unknown(path: Path) -> str:
         text = start[: error.start].decode("utf-8") if len(start) - error.start < 4 else ""
     printable = bool(text) and all(c.isprintable() or c in "\r\n\t" for c in text)
     what = "text" if printable else "binary data"
-    return (
-        f"unknown format ({what}, {size} bytes, begins with {start[:8].hex()}); if it is one of "
-        f"{names}, name it with --as"
+    raise UsageError(
+        f"{path}: unknown format ({what}, {size} bytes, begins with {start[:8].hex()}); if it is "
+        f"one of {names}, name it with --as"
     )
 
 

@@ -75,8 +75,11 @@ def another_unit(stream: object, size: float) -> str:
     """Which unit the metres of markers or outlines may be, on a body of `size` m; "" where they fit
     it, and for other streams."""
     if isinstance(stream, Markers):
-        what, span = max((("move by", _moved(stream.x)), ("span", _spread(stream.x))),
-                         key=lambda found: found[1])  # fmt: skip
+        # Peak to peak of the marker that moves most along an axis.
+        x = stream.x
+        seen = [x[np.isfinite(x[:, j]).all(axis=1), j] for j in range(x.shape[1])]
+        moved = max((float(np.ptp(one, axis=0).max()) for one in seen if len(one)), default=0.0)
+        what, span = max(("move by", moved), ("span", _spread(x)), key=lambda found: found[1])
     elif isinstance(stream, Contours):
         what, span = "span", _extent(stream)
     else:
@@ -117,12 +120,6 @@ def _spread(x: Floats) -> float:
     seen = np.asarray(np.isfinite(x).all(axis=2))
     at = np.flatnonzero(seen.sum(axis=1) >= 2)
     return float(np.ptp(x[at[0]][seen[at[0]]], axis=0).max()) if len(at) else 0.0
-
-
-def _moved(x: Floats) -> float:
-    """m peak to peak of the marker of x (nt, k, d) m that moves most along an axis."""
-    seen = [x[np.isfinite(x[:, j]).all(axis=1), j] for j in range(x.shape[1])]
-    return max((float(np.ptp(one, axis=0).max()) for one in seen if len(one)), default=0.0)
 
 
 def _extent(contours: Contours) -> float:

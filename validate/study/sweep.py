@@ -42,8 +42,34 @@ def axis(text: str) -> Axis:
     if not (sign and path and values):
         raise UsageError(f"--sweep {text}: expected PATH=log:A:B:N, PATH=lin:A:B:N or PATH=A,B,C")
     kind = values.partition(":")[0]
-    spaced = kind in ("log", "lin") and ":" in values
-    found = _spaced(text, kind, values) if spaced else _listed(text, values)
+    if kind in ("log", "lin") and ":" in values:
+        parts = values.split(":")
+        unit = (split(parts[1]) or (0.0, ""))[1] if len(parts) == 4 else ""
+        try:
+            count = int(parts[3])
+            start, end = (_number(part, unit) for part in parts[1:3])
+        except (IndexError, ValueError):
+            raise UsageError(f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT") from None
+        if start is None or end is None:
+            raise UsageError(
+                f"--sweep {text}: expected FIRST and LAST as numbers, without a unit "
+                "(SI) or with the same unit"
+            )
+        if len(parts) != 4 or not 2 <= count <= LARGEST or not np.isfinite([start, end]).all():
+            raise UsageError(
+                f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT with 2 to {LARGEST} values"
+            )
+        if kind == "log" and min(start, end) <= 0:
+            raise UsageError(f"--sweep {text}: a logarithmic sweep needs ends above 0")
+        spaced = np.geomspace if kind == "log" else np.linspace
+        found = tuple(f"{v:.6g}{unit}" for v in spaced(start, end, count))
+    else:
+        found = tuple(part.strip() for part in values.split(","))
+        if not all(found):
+            raise UsageError(
+                f"--sweep {text}: there is an empty value between commas; give one value between "
+                "two commas"
+            )
     twice = [v for i, v in enumerate(found) if v in found[:i]]
     if twice:
         raise UsageError(f"--sweep {text}: '{twice[0]}' is given twice; give each value once")
@@ -85,37 +111,3 @@ def _number(text: str, unit: str) -> float | None:
     if found is None or bool(found[1]) != bool(unit):
         return None
     return in_si(found[0], found[1], unit) if unit else found[0]
-
-
-def _listed(text: str, values: str) -> tuple[str, ...]:
-    found = tuple(part.strip() for part in values.split(","))
-    if not all(found):
-        raise UsageError(
-            f"--sweep {text}: there is an empty value between commas; give one "
-            "value between two commas"
-        )
-    return found
-
-
-def _spaced(text: str, kind: str, values: str) -> tuple[str, ...]:
-    parts = values.split(":")
-    unit = (split(parts[1]) or (0.0, ""))[1] if len(parts) == 4 else ""
-    try:
-        count = int(parts[3])
-        start, end = (_number(part, unit) for part in parts[1:3])
-    except (IndexError, ValueError):
-        raise UsageError(f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT") from None
-    if start is None or end is None:
-        raise UsageError(
-            f"--sweep {text}: expected FIRST and LAST as numbers, without a unit "
-            "(SI) or with the same unit"
-        )
-    if len(parts) != 4 or not 2 <= count <= LARGEST or not np.isfinite([start, end]).all():
-        raise UsageError(
-            f"--sweep {text}: expected {kind}:FIRST:LAST:COUNT with 2 to {LARGEST} values"
-        )
-    if kind == "lin":
-        return tuple(f"{v:.6g}{unit}" for v in np.linspace(start, end, count))
-    if min(start, end) <= 0:
-        raise UsageError(f"--sweep {text}: a logarithmic sweep needs ends above 0")
-    return tuple(f"{v:.6g}{unit}" for v in np.geomspace(start, end, count))

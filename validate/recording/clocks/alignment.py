@@ -9,7 +9,6 @@ Process. 21, eqs. 10-12, in one dimension); the slope of the correlation is then
 between the samples. Its curvature there and the residual noise give the standard uncertainty.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -132,10 +131,17 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
     most noise.
     """
     from scipy.interpolate import CubicSpline
+    from scipy.ndimage import gaussian_filter1d
 
-    x_of = CubicSpline(*_distinct(known))
+    times, values = _distinct(known)
+    x_of = CubicSpline(times, values)
     width = max(step_of(known.t), step_of(seen.t))
-    smooth, slope = _smoothed(known, SMOOTHING * width)
+    # The reference and its slope (1/s) on a grid, under a Gaussian.
+    spacing = step_of(times)
+    grid = np.arange(times[0], times[-1] + spacing, spacing)
+    even, sigma = np.interp(grid, times, values), SMOOTHING * width / spacing
+    smooth = gaussian_filter1d(even, sigma, mode="nearest")
+    slope = gaussian_filter1d(even, sigma, order=1, mode="nearest") / spacing
     usable = np.all([met(known.t, seen.t + start + w) for w in (-2 * width, 2 * width)], axis=0)
     if usable.sum() < MIN_MATCHED:
         raise RecordingError(
@@ -145,9 +151,9 @@ def refined_lag(known: Signal, seen: Signal, start: float) -> tuple[float, float
     tries = np.linspace(-width, width, _TRIES)
     tau = start
     for _ in range(_MAX_STEPS):
-        along = np.column_stack([np.ones_like(t), smooth(t + tau)])
+        along = np.column_stack([np.ones_like(t), np.interp(t + tau, grid, smooth)])
         # x less its least-squares parts along the columns.
-        x = slope(t + tau)
+        x = np.interp(t + tau, grid, slope)
         g = np.asarray(x - along @ np.linalg.lstsq(along, x, rcond=None)[0])
         left = np.stack([_left(along, x_of(t + tau + x), y) for x in tries])
         falls, at_zero = np.polyfit(tries, left @ g, 1)
@@ -193,21 +199,6 @@ def _left(along: Floats, x: Floats, y: Floats) -> Floats:
     line = np.column_stack([np.ones_like(x), x])
     a, b = np.linalg.solve(along.T @ line, along.T @ y)
     return np.asarray(y - a - b * x)
-
-
-def _smoothed(
-    signal: Signal, width: float
-) -> tuple[Callable[[Floats], Floats], Callable[[Floats], Floats]]:
-    """The signal and its slope (1/s) under a Gaussian of `width` s, as functions of time."""
-    from scipy.ndimage import gaussian_filter1d
-
-    t, y = _distinct(signal)
-    step = step_of(t)
-    grid = np.arange(t[0], t[-1] + step, step)
-    values = np.interp(grid, t, y)
-    smooth = gaussian_filter1d(values, width / step, mode="nearest")
-    slope = gaussian_filter1d(values, width / step, order=1, mode="nearest") / step
-    return lambda x: np.interp(x, grid, smooth), lambda x: np.interp(x, grid, slope)
 
 
 def met(t: Floats, wanted: Floats) -> Bools:

@@ -10,6 +10,7 @@ turns the sign.
 """
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -35,36 +36,31 @@ def channel(recording: Recording, name: str) -> Signal:
         raise _unknown(recording, name)
     topic = max(topics, key=len)
     stream, rest = recording.streams[topic], plain[len(topic) + 1 :]
-    found = _found(stream, rest)
+    found: Signal | None = None
+    match stream:
+        case Signal() if not rest and stream.y.shape[1] == 1:
+            found = stream
+        case Signal() if rest.isdecimal() and int(rest) < stream.y.shape[1]:
+            found = replace(stream, y=stream.y[:, [int(rest)]])
+        case Markers():
+            marker, _, axis = rest.rpartition(".")
+            axes = _AXES[: stream.x.shape[2]]
+            if marker in stream.names and len(axis) == 1 and axis in axes:
+                x = stream.x[:, stream.names.index(marker), axes.index(axis)]
+                # Missing ones leave before a signal of finite numbers is made.
+                seen = np.isfinite(x)
+                found = Signal(stream.t[seen], x[seen, None], "m", stream.sd, stream.frame)
+        case Frames() if rest == "brightness":
+            found = _grey(stream.t, [image.mean() for image in stream.images])
+        case Frames() if rest == "change" and len(stream.images) > 1:
+            pairs = pairwise(stream.images)
+            change = [np.sqrt(((b.astype(float) - a) ** 2).mean()) for a, b in pairs]
+            found = _grey((stream.t[1:] + stream.t[:-1]) / 2, change)
     if found is None:
         raise _unknown(recording, name)
     seen = np.isfinite(found.y[:, 0])
     sign = -1.0 if name.startswith("-") else 1.0
     return replace(found, t=found.t[seen], y=sign * found.y[seen])
-
-
-def _found(stream: object, rest: str) -> Signal | None:
-    match stream:
-        case Signal() if not rest and stream.y.shape[1] == 1:
-            return stream
-        case Signal() if rest.isdecimal() and int(rest) < stream.y.shape[1]:
-            return replace(stream, y=stream.y[:, [int(rest)]])
-        case Markers():
-            marker, _, axis = rest.rpartition(".")
-            axes = _AXES[: stream.x.shape[2]]
-            if marker not in stream.names or len(axis) != 1 or axis not in axes:
-                return None
-            x = stream.x[:, stream.names.index(marker), axes.index(axis)]
-            # Missing ones leave before a signal of finite numbers is made.
-            seen = np.isfinite(x)
-            return Signal(stream.t[seen], x[seen, None], "m", stream.sd, stream.frame)
-        case Frames() if rest in _OF_IMAGES:
-            if rest == "brightness":
-                return _grey(stream.t, [image.mean() for image in stream.images])
-            pairs = zip(stream.images[:-1], stream.images[1:], strict=True)
-            away = [np.sqrt(((b.astype(float) - a) ** 2).mean()) for a, b in pairs]
-            return _grey((stream.t[1:] + stream.t[:-1]) / 2, away) if away else None
-    return None
 
 
 def _grey(t: Floats, values: list[float]) -> Signal:

@@ -61,10 +61,19 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     """Every array of numbers by its path, after the checksums of variables that are compressed.
 
     `data.load` is the field `load` of the struct `data`. What is no array of numbers stands as its
-    own word for what it is: an array () of text.
+    own word for what it is: an array () of text. Raises `RecordingError` for a variable that fails
+    its checksum, and for more numbers than `MOST_NUMBERS` of an HDF5 file.
     """
     if head(path, len(MAGIC_73)).startswith((MAGIC_73, _HDF5)):
-        return _hdf5_arrays(path)
+        # Axes as MATLAB shows them.
+        import h5py
+
+        with h5py.File(path, "r") as file:
+            held = dict(_held(h5py, file, "", _DEPTH))
+            count = sum(v.size for v in held.values() if not isinstance(v, str))
+            if count > MOST_NUMBERS:
+                raise RecordingError(f"{count} numbers, the limit is {MOST_NUMBERS}; split it")
+            return {n: np.array(v) if isinstance(v, str) else _values(v) for n, v in held.items()}
     from scipy.io import loadmat
 
     # Every packed variable unpacks to the size that it states itself, and to its checksum.
@@ -96,21 +105,17 @@ def _fields(path: str, stored: Any, classed: Any) -> Iterator[tuple[str, NDArray
             yield from _fields(f"{path}.{name}", stored.flat[0][name], classed.flat[0][name])
     elif dtype.kind in "fiubc" and type(stored) is np.ndarray:
         yield path, stored if dtype.kind == "c" else classed
+    elif type(stored) is np.ndarray:
+        kind = {"O": "cell", "U": "char"}.get(dtype.kind, "?")
+        yield path, np.array("struct array" if dtype.names else kind)
     else:
-        yield path, np.array(_word(stored, dtype))
+        kind = type(stored).__name__.removeprefix("Matlab").lower()
+        yield path, np.array("sparse" if hasattr(stored, "nnz") else kind)
 
 
 def _text(field: Any) -> str:
     first = np.asarray(field).reshape(-1)[0]
     return first.decode("ascii", "replace") if isinstance(first, bytes) else ""
-
-
-def _word(value: Any, dtype: np.dtype[Any]) -> str:
-    if type(value) is np.ndarray:
-        return "struct array" if dtype.names else {"O": "cell", "U": "char"}.get(dtype.kind, "?")
-    return (
-        "sparse" if hasattr(value, "nnz") else type(value).__name__.removeprefix("Matlab").lower()
-    )
 
 
 def _unpacks(packed: bytes, order: str) -> bool:
@@ -148,22 +153,6 @@ def _unpacks(packed: bytes, order: str) -> bool:
 # --- MATLAB 7.3: HDF5.
 
 
-def _hdf5_arrays(path: Path) -> dict[str, NDArray[Any]]:
-    """Arrays of an HDF5 file by their path, axes as MATLAB shows them.
-
-    What is no array of numbers is its own word: an array () of text. Raises `RecordingError` for
-    more numbers than `MOST_NUMBERS`.
-    """
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        found = dict(_held(h5py, file, "", _DEPTH))
-        count = sum(v.size for v in found.values() if not isinstance(v, str))
-        if count > MOST_NUMBERS:
-            raise RecordingError(f"{count} numbers, the limit is {MOST_NUMBERS}; split it")
-        return {n: np.array(v) if isinstance(v, str) else _values(v) for n, v in found.items()}
-
-
 def _held(h5py: Any, group: Any, before: str, depth: int) -> Iterator[tuple[str, Any]]:
     """Datasets of numbers and words for what is none, by path."""
     for name in group:
@@ -177,8 +166,20 @@ def _held(h5py: Any, group: Any, before: str, depth: int) -> Iterator[tuple[str,
         kind = _kind(item)
         if isinstance(item, h5py.Group) and kind == "struct" and depth:
             yield from _held(h5py, item, f"{path}.", depth - 1)
+        elif not isinstance(item, h5py.Dataset):
+            yield path, kind
+        elif item.dtype.kind == "O" and kind in ("", "struct", *_NUMBERS):
+            yield path, "struct array"  # a reference for each element
+        elif kind and kind not in _NUMBERS:
+            yield path, kind
+        elif item.attrs.get("MATLAB_empty", 0):
+            yield path, f"empty {kind}"
+        elif item.is_virtual or item.external:
+            yield path, "data in another file, not followed"
+        elif item.dtype.names:
+            yield path, f"{item.shape[::-1]} complex"  # real, imag
         else:
-            yield path, _dataset(h5py, item, kind)
+            yield path, item if item.dtype.kind in "fiub" else str(item.dtype)
 
 
 def _kind(item: Any) -> str:
@@ -186,23 +187,6 @@ def _kind(item: Any) -> str:
         return "sparse"
     said = item.attrs.get("MATLAB_class", b"struct" if hasattr(item, "keys") else b"")
     return said.decode("ascii", "replace") if isinstance(said, bytes) else str(said)
-
-
-def _dataset(h5py: Any, item: Any, kind: str) -> Any:
-    """The dataset where it holds numbers, else a word for what it is."""
-    if not isinstance(item, h5py.Dataset):
-        return kind
-    if item.dtype.kind == "O" and kind in ("", "struct", *_NUMBERS):
-        return "struct array"  # a reference for each element
-    if kind and kind not in _NUMBERS:
-        return kind
-    if item.attrs.get("MATLAB_empty", 0):
-        return f"empty {kind}"
-    if item.is_virtual or item.external:
-        return "data in another file, not followed"
-    if item.dtype.names:
-        return f"{item.shape[::-1]} complex"  # real, imag
-    return item if item.dtype.kind in "fiub" else str(item.dtype)
 
 
 def _values(dataset: Any) -> NDArray[Any]:

@@ -72,6 +72,7 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
 @contextmanager
 def _opened(path: Path, folder: Path) -> Iterator[_Bag]:
     from rosbags import rosbag1, rosbag2
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     one = head(path, len(ROS1)) == ROS1
     # A plain name with its ending: the library goes by that, and makes an address of the name.
@@ -89,21 +90,18 @@ def _opened(path: Path, folder: Path) -> Iterator[_Bag]:
             "encoding = 'unknown'\""
         ) from None
     with closing(reader):
-        yield _ros1(reader) if one else _Bag(reader, _defined, lambda raw, _: raw)
-
-
-def _ros1(reader: Any) -> _Bag:
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.EMPTY)
-    header = {_HEADER: get_typestore(Stores.ROS2_HUMBLE).fielddefs[_HEADER]}
-    for c in reader.connections:  # the number in ROS 1's header is dropped as messages are turned
-        store.register({**get_types_from_msg(c.msgdef.data, c.msgtype), **header})
-    return _Bag(
-        reader,
-        lambda c: store.generate_msgdef(c.msgtype, ros_version=2)[0],
-        lambda raw, kind: bytes(store.ros1_to_cdr(raw, kind)),
-    )
+        if not one:
+            yield _Bag(reader, _defined, lambda raw, _: raw)
+            return
+        store = get_typestore(Stores.EMPTY)
+        header = {_HEADER: get_typestore(Stores.ROS2_HUMBLE).fielddefs[_HEADER]}
+        for c in reader.connections:  # the number in ROS 1's header is dropped from messages
+            store.register({**get_types_from_msg(c.msgdef.data, c.msgtype), **header})
+        yield _Bag(
+            reader,
+            lambda c: store.generate_msgdef(c.msgtype, ros_version=2)[0],
+            lambda raw, kind: bytes(store.ros1_to_cdr(raw, kind)),
+        )
 
 
 def _defined(connection: Any) -> str:
@@ -139,11 +137,15 @@ def read_bag(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path}: no such file or folder")
     if not _recognises(path):
         raise RecordingError(f"{path.name}: not a ROS bag")
-    if path.is_dir() and (one := _only_mcap(path)):
-        return read_all(one, options)
     # All files of a folder; of a single file, that it can be read without its metadata.
-    names, packed = _told(path if path.is_dir() else path.parent)
+    listing = (path if path.is_dir() else path.parent) / _YAML
+    told = read_text(member(listing)) if listing.is_file() else ""
+    names, packed = list(dict.fromkeys(_NAMED.findall(told))), bool(_PACKED.search(told))
     if path.is_dir():
+        # A bag of one MCAP file is what the reader of MCAP knows, whatever its name.
+        mcap = [member(f) for f in members(path) if f.suffix == ".mcap"]
+        if len(mcap) == 1 and len(names) < 2 and not packed:
+            return read_all(mcap[0], options)
         if missing := [name for name in names if not (path / name).is_file()]:
             raise RecordingError(
                 f"{path.name}: its {_YAML} names {len(names)} files, but {missing[0]} is missing; "
@@ -180,20 +182,6 @@ def read_bag(path: Path, options: Options) -> Recording:
     said = "a bag keeps no checksum: integrity not provable"
     source = Source(path.resolve().name, "", 0, said) if path.is_dir() else source_of(path, said)
     return replace(got, source=source, unread={**got.unread, **never})
-
-
-def _told(folder: Path) -> tuple[list[str], bool]:
-    """The files of a bag as its metadata has them, and whether each message is compressed."""
-    file = folder / _YAML
-    told = read_text(member(file)) if file.is_file() else ""
-    return list(dict.fromkeys(_NAMED.findall(told))), bool(_PACKED.search(told))
-
-
-def _only_mcap(folder: Path) -> Path | None:
-    """The one MCAP file of a bag of one file, which its own reader knows, whatever its name."""
-    names, packed = _told(folder)
-    there = [member(f) for f in members(folder) if f.suffix == ".mcap"]
-    return there[0] if len(there) == 1 and len(names) < 2 and not packed else None
 
 
 def _recognises(path: Path) -> bool:

@@ -119,7 +119,16 @@ def _decode(decoder: str, path: Path, out: Path, limits: str, given: str) -> int
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     try:
         module = import_module(decoder if "." in decoder else f"{_HOME}.{decoder}")
-        limit = _loaded(module, path, limit)
+        for name in getattr(module, "LIBRARIES", ()):
+            import_module(name)
+        # A module that names its MEMORY may take that, and what its file may need, beyond what is
+        # taken now, where the kernel tells.
+        more, taken = getattr(module, "MEMORY", None), Path("/proc/self/statm")
+        if more is not None and taken.is_file():
+            pages = int(taken.read_text().split()[0])
+            more += _TIMES * _bytes(path)
+            limit = min(limit, pages * resource.getpagesize() + more)
+            resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
         signal.setitimer(signal.ITIMER_PROF, seconds)  # its signal ends what is in C, too
         arrays: Arrays = module.arrays(path, **json.loads(given))
     except ImportError as missing:
@@ -139,21 +148,6 @@ def _decode(decoder: str, path: Path, out: Path, limits: str, given: str) -> int
     signal.setitimer(signal.ITIMER_PROF, 0)
     np.savez(out, allow_pickle=False, **{f"{_OURS}{name}": a for name, a in arrays.items()})
     return 0
-
-
-def _loaded(module: Any, path: Path, limit: int) -> int:
-    """Loads its LIBRARIES, and gives the limit of memory: a module that names its MEMORY may take
-    that and so much as its file may need beyond what is taken now, where the kernel tells."""
-    for name in getattr(module, "LIBRARIES", ()):
-        import_module(name)
-    more, taken = getattr(module, "MEMORY", None), Path("/proc/self/statm")
-    if more is None or not taken.is_file():
-        return limit
-    pages = int(taken.read_text().split()[0])
-    more += _TIMES * _bytes(path)
-    limit = min(limit, pages * resource.getpagesize() + more)
-    resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    return limit
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """Reader of DICOM images, mainly ultrasound: one stream per calibrated region."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -100,7 +98,30 @@ def read_dicom(path: Path, options: Options) -> Recording:
             )
         t = np.asarray(np.rint(1e9 * found["t"]) / 1e9)
     frame = options.get("frame", "image")
-    regions, scale = _regions(path, found, options)
+    # Where each stream lies in the image, px, and the sides of its pixels, m; what states them.
+    planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
+              and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
+    if "m_per_px" in options:
+        side = length(options, "m_per_px", "0.1mm")
+        regions = [((0, 0, width, height), (side, side))]
+        scale = f"{options['m_per_px']} per pixel (entered)"
+    elif planes:
+        regions = [
+            (_box(path, r, width, height), (float(r[4]), float(r[5])))
+            for r in sorted(planes, key=lambda r: (float(r[0]), float(r[1])))
+        ]
+        listed = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in regions)
+        scale = f"{listed} mm per pixel (SequenceOfUltrasoundRegions)"
+    else:
+        spacing = found["spacing"]
+        if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
+            raise UsageError(
+                f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
+                f"m_per_px=0.1mm"
+            )
+        x, y = 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
+        regions = [((0, 0, width, height), (x, y))]
+        scale = f"{1e3 * x:.6g} x {1e3 * y:.6g} mm per pixel (PixelSpacing)"
     streams: dict[str, Stream] = {}
     told = dict(text.split(": ", 1) for text in found["told"].tolist())
     for i, (box, sides) in enumerate(regions, start=1):
@@ -115,34 +136,6 @@ def read_dicom(path: Path, options: Options) -> Recording:
     name = path.resolve().name if path.is_dir() else path.stem
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, told)
-
-
-def _regions(
-    path: Path, found: Mapping[str, Any], options: Options
-) -> tuple[list[tuple[_Box, tuple[float, float]]], str]:
-    """Where each stream lies in the image, px, and the sides of its pixels, m; what states them."""
-    _, height, width = found["images"].shape
-    whole = (0, 0, width, height)
-    if "m_per_px" in options:
-        side = length(options, "m_per_px", "0.1mm")
-        return [(whole, (side, side))], f"{options['m_per_px']} per pixel (entered)"
-    planes = [r for r in found["regions"] if r[6] == _PLANE and r[7] in _TISSUE
-              and np.isfinite(r[4:6]).all() and (r[4:6] > 0).all()]  # fmt: skip
-    if not planes:
-        spacing = found["spacing"]
-        if len(spacing) != 2 or not (np.isfinite(spacing).all() and (spacing > 0).all()):
-            raise UsageError(
-                f"{path.name}: has no scale, neither regions in cm nor a spacing; give --map "
-                f"m_per_px=0.1mm"
-            )
-        x, y = 1e-3 * float(spacing[0]), 1e-3 * float(spacing[1])
-        return [(whole, (x, y))], f"{1e3 * x:.6g} x {1e3 * y:.6g} mm per pixel (PixelSpacing)"
-    boxes = [
-        (_box(path, r, width, height), (float(r[4]), float(r[5])))
-        for r in sorted(planes, key=lambda r: (float(r[0]), float(r[1])))
-    ]
-    sides = ", ".join(f"{1e3 * x:.6g} x {1e3 * y:.6g}" for _, (x, y) in boxes)
-    return boxes, f"{sides} mm per pixel (SequenceOfUltrasoundRegions)"
 
 
 def _box(path: Path, region: Floats, width: int, height: int) -> _Box:

@@ -73,12 +73,16 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     images = _images(sets)
     t, timed = _moments(sets) if len(sets) > 1 else _times(sets[0], len(images))
     ds = sets[0]
+    # Between rows and columns, mm: of the image, or of all its frames alike.
+    shared = (m for s in ds.get("SharedFunctionalGroupsSequence", ())
+              for m in s.get("PixelMeasuresSequence", ()))  # fmt: skip
+    spacing = next(shared, ds).get("PixelSpacing") or ()
     return {
         "images": images,
         "t": t,
         "timed": np.array(timed),
         "regions": np.array([_region(r) for r in ds.get("SequenceOfUltrasoundRegions", ())]),
-        "spacing": np.array(list(_spacing(ds) or ())[::-1], dtype=np.float64),
+        "spacing": np.array(list(spacing)[::-1], dtype=np.float64),
         "told": np.array([f"{k}: {ds.get(k)}" for k in _TOLD if ds.get(k) not in (None, "")]),
     }
 
@@ -135,14 +139,6 @@ def _second(text: str) -> float:
     return seconds + float(f"0.{clock[2] or 0}")
 
 
-def _spacing(ds: pydicom.Dataset) -> Any:
-    """Between rows and columns, mm: of the image, or of all its frames alike."""
-    for shared in ds.get("SharedFunctionalGroupsSequence", ()):
-        for measures in shared.get("PixelMeasuresSequence", ()):
-            return measures.get("PixelSpacing")
-    return ds.get("PixelSpacing")
-
-
 def _require_few_bytes(path: Path) -> None:
     """Raises `RecordingError` for a file that is packed as a whole and unpacks to too much: its
     library unpacks it before it looks at it."""
@@ -191,7 +187,14 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
             count = int(ds.get("NumberOfFrames") or 1)
             yield from (pixel_array(ds, index=i) for i in range(count))
         else:
-            yield from iter_pixels(ds, decoding_plugin=_codec(ds))
+            # By this library, whatever else is installed; "" for pydicom's own.
+            syntax, codec = ds.file_meta.get("TransferSyntaxUID"), ""
+            if syntax in _LOSSLESS:
+                import_module("gdcm")  # its absence is told with what to install
+                codec = "gdcm"
+            elif syntax in (*JPEGTransferSyntaxes, *JPEG2000TransferSyntaxes):
+                codec = "pillow"
+            yield from iter_pixels(ds, decoding_plugin=codec)
     except (NotImplementedError, RuntimeError) as error:
         lacks = any(words in str(error) for words in _LACKS)
         if lacks or isinstance(error, NotImplementedError):
@@ -204,15 +207,6 @@ def _frames(ds: pydicom.Dataset) -> Iterator[NDArray[Any]]:
                 f"{instead}"
             ) from None
         raise
-
-
-def _codec(ds: pydicom.Dataset) -> str:
-    """By which library, whatever else is installed; none for pydicom's own."""
-    syntax = ds.file_meta.get("TransferSyntaxUID")
-    if syntax in _LOSSLESS:
-        import_module("gdcm")  # its absence is told with what to install
-        return "gdcm"
-    return "pillow" if syntax in (*JPEGTransferSyntaxes, *JPEG2000TransferSyntaxes) else ""
 
 
 def _grey(ds: pydicom.Dataset, image: NDArray[Any]) -> NDArray[Any]:

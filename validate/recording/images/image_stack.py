@@ -1,14 +1,13 @@
 """Reader of camera and microscope images (PNG, JPEG, TIFF, BMP): a folder or a TIFF stack."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.streams import recorded
 from validate.recording.formats.subprocess_decoder import decoded
@@ -96,24 +95,19 @@ def _pages(file: Path) -> Iterator[tuple[NDArray[Any], bool]]:
                 coloured = page.mode not in _GREY
                 plain = page.convert("L") if coloured or page.mode in ("1", "LA") else page
                 pixels = np.asarray(plain)
-                yield pixels.astype(_depth(pixels)), coloured and _has_colour(page)
+                depth: Any = np.uint8
+                if pixels.dtype != np.uint8:
+                    whole = pixels.dtype.kind in "iu" and 0 <= pixels.min() <= pixels.max() < 2**16
+                    depth = np.uint16 if whole else np.float64
+                if coloured:  # which a page of a mode for colour may lack
+                    colours = np.asarray(page.convert("RGB"))[::4, ::4].astype(np.int16)
+                    coloured = bool(np.ptp(colours, axis=2).max(initial=0) > 0)
+                yield pixels.astype(depth), coloured
     except RecordingError:
         raise
     except Exception as error:  # whatever a codec raises on damage
         why = " ".join(str(error).split())[:150] or type(error).__name__
         raise RecordingError(f"{file.name}: damaged ({why})") from None
-
-
-def _has_colour(page: Any) -> bool:
-    pixels = np.asarray(page.convert("RGB"))[::4, ::4].astype(np.int16)
-    return bool(np.ptp(pixels, axis=2).max(initial=0) > 0)
-
-
-def _depth(pixels: NDArray[Any]) -> Any:
-    if pixels.dtype == np.uint8:
-        return np.uint8
-    whole = pixels.dtype.kind in "iu" and pixels.min() >= 0 and pixels.max() < 2**16
-    return np.uint16 if whole else np.float64
 
 
 def _stated(file: Path) -> dict[str, NDArray[Any]]:
@@ -216,7 +210,19 @@ def read_image_stack(path: Path, options: Options) -> Recording:
         x, y = (factor * float(side) for side in found["side"])
         sides = x, y
         scale = f"{found['side'][0]:.6g} {unit} per pixel (declared by {found['by']})"
-    t, times = _times(path, len(images), found, options)
+    count, interval = len(images), float(found["interval"]) if "interval" in found else 0.0
+    if "rate" in options:
+        rate = above_zero(options, "rate")
+        t, times = np.arange(count) / rate, f"{rate:g} Hz (entered)"
+    elif np.isfinite(interval) and interval > 0:
+        times = f"every {interval:g} s (declared by {found['by']})"
+        t = np.asarray(interval * np.arange(count))
+    elif count == 1:
+        t, times = np.zeros(1), "one image"
+    else:
+        raise UsageError(
+            f"{path.name}: {count} images without times; give --rate HZ (a volume is not read)"
+        )
     topic, frame = options.get("topic", "images"), options.get("frame", "image")
     streams = {
         name: Frames(t[at], tuple(images[i] for i in at), sides, np.eye(4), frame)
@@ -232,24 +238,6 @@ def read_image_stack(path: Path, options: Options) -> Recording:
     whole = "images keep no common checksum: integrity not provable"
     source = Source(name, "", 0, whole) if path.is_dir() else source_of(path, whole)
     return recorded(name, source, streams, said)
-
-
-def _times(
-    path: Path, count: int, found: Mapping[str, Any], options: Options
-) -> tuple[Floats, str]:
-    if "rate" in options:
-        rate = above_zero(options, "rate")
-        return np.arange(count) / rate, f"{rate:g} Hz (entered)"
-    interval = float(found["interval"]) if "interval" in found else 0.0
-    if np.isfinite(interval) and interval > 0:
-        return np.asarray(
-            interval * np.arange(count)
-        ), f"every {interval:g} s (declared by {found['by']})"
-    if count == 1:
-        return np.zeros(1), "one image"
-    raise UsageError(
-        f"{path.name}: {count} images without times; give --rate HZ (a volume is not read)"
-    )
 
 
 def _recognises(path: Path) -> bool:

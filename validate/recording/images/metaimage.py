@@ -7,7 +7,6 @@ limit to a line, within one to the whole. Pixels are raw or one zlib stream.
 
 import re
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -62,22 +61,22 @@ def read_metaimage(path: Path, options: Options) -> Recording:
         x = y = 0.0
     if not (0 < x < np.inf and 0 < y < np.inf):
         raise RecordingError(f"{path.name}: ElementSpacing '{' '.join(sides)[:60]}' is not a size")
-    held = Sequence(by_frame(fields.items()), images, (x, y), kind, way, deep=_deep(fields))
-    return recorded(path, held, options)
-
-
-def _deep(fields: Mapping[str, str]) -> str:
-    """Three axes of space, which MetaImage has where no kind says another."""
+    # Three axes of space, where no kind says another.
     of_space = set(fields.get("Kinds", "").split()) <= {"domain", "space"}
-    if not of_space or fields.get("NDims") != "3":
-        return ""
-    return f"spacing {fields.get('ElementSpacing', 'not stated')}"
+    volume = of_space and fields.get("NDims") == "3"
+    deep = f"spacing {fields.get('ElementSpacing', 'not stated')}" if volume else ""
+    held = Sequence(by_frame(fields.items()), images, (x, y), kind, way, deep=deep)
+    return recorded(path, held, options)
 
 
 def _images(path: Path, fields: dict[str, str], after: int) -> tuple[NDArray[Any], ...]:
     """Images n x (h, w); none where the sequence has transforms alone."""
     # Width, height and count; of four numbers the third is the depth of each image: 1.
-    sizes = _whole(path, fields, "DimSize")
+    text = fields.get("DimSize", "")
+    try:
+        sizes = [int(word) for word in text.split()]
+    except ValueError:
+        raise RecordingError(f"{path.name}: DimSize '{text[:60]}': not numbers") from None
     if len(sizes) not in (2, 3, 4) or min(sizes) < 0:
         raise RecordingError(f"{path.name}: DimSize {sizes}: expected 2, 3 or 4 numbers")
     if len(sizes) == 4 and sizes[2] > 1:
@@ -136,13 +135,6 @@ def _packed(path: Path, fields: dict[str, str], after: int, size: int) -> bytes:
             return stream.read(2 * size + 4096)
     except (OSError, RecordingError) as error:
         raise RecordingError(f"{path.name}: its pixels cannot be read ({error})") from error
-
-
-def _whole(path: Path, fields: dict[str, str], key: str) -> list[int]:
-    try:
-        return [int(word) for word in fields.get(key, "").split()]
-    except ValueError:
-        raise RecordingError(f"{path.name}: {key} '{fields[key][:60]}': not numbers") from None
 
 
 def _recognises(path: Path) -> bool:

@@ -47,24 +47,47 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
     pixels, header = nrrd.read(str(path))
     own = {key: text for key, text in header.items() if isinstance(text, str)}
     kinds = [str(kind).lower() for kind in header.get("kinds", ())]
+    # Colour as grey, and the axis that lists the images, as 3D Slicer has it first, at the end.
+    axes = kinds
+    colours = (i for i, k in enumerate(kinds) if k in _COLOUR and pixels.shape[i] in (3, 4))
+    if (colour := next(colours, None)) is not None:
+        pixels = luma(np.moveaxis(pixels, colour, -1))
+        axes = kinds[:colour] + kinds[colour + 1 :]
+    if _LIST in axes:
+        pixels = np.moveaxis(pixels, axes.index(_LIST), -1)
+    # Sides of a pixel: from the spacings, or the lengths of the directions, of the first two axes
+    # in space; 1 1 where none is stated.
+    space = [i for i, kind in enumerate(kinds) if kind in _SPACE]
+    plane = space[:2] if len(space) > 1 else [0, 1]
+    directions = header.get("space directions")
+    sides = np.ones(2)
+    if "spacings" in header:
+        sides = np.asarray(header["spacings"], dtype=np.float64)[plane]
+    elif directions is not None:
+        sides = np.array([np.linalg.norm(directions[k]) for k in plane], dtype=np.float64)
+    # What makes all axes those of space, three without colour: their kinds, else their directions
+    # or spacings.
+    shown = [i for i in range(len(header["sizes"])) if not kinds or kinds[i] not in _COLOUR]
+    units = [str(unit) for unit in header.get("units", ())]
+    apart = np.array(header.get("spacings", ()), dtype=np.float64)
+    rows = [] if directions is None else [row for row in directions if row is not None]
+    deep, three = "", len(shown) == 3
+    if three and kinds:
+        deep = "its three axes are of space" * all(kinds[i] in _SPACE for i in shown)
+    elif (
+        three and np.isfinite(apart).sum() == 3 and not any(in_si(1.0, u, "s") for u in units if u)
+    ):
+        deep = f"spacings {' '.join(f'{side:g}' for side in apart)}"
+    elif three and len(rows) == 3 and np.isfinite(rows).all():
+        deep = "three space directions"
     return {
-        "pixels": _images_last(pixels, kinds),
+        "pixels": pixels,
         "keys": np.array(list(own), dtype=str),
         "texts": np.array(list(own.values()), dtype=str),
-        "spacing": _spacing(header, kinds),
+        "spacing": sides,
         "times": _times(header, kinds),
-        "deep": np.array(_deep(header, kinds)),
+        "deep": np.array(deep),
     }
-
-
-def _images_last(pixels: NDArray[Any], kinds: list[str]) -> NDArray[Any]:
-    """Colour as grey, and the axis that lists the images, as 3D Slicer has it first, at the end."""
-    for i, kind in enumerate(kinds):
-        if kind in _COLOUR and pixels.shape[i] in (3, 4):
-            pixels = luma(np.moveaxis(pixels, i, -1))
-            kinds = kinds[:i] + kinds[i + 1 :]
-            break
-    return np.moveaxis(pixels, kinds.index(_LIST), -1) if _LIST in kinds else pixels
 
 
 def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
@@ -78,36 +101,6 @@ def _times(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
     except ValueError:
         return np.empty(0)
     return t * factor if factor is not None and (np.diff(t) > 0).all() else np.empty(0)
-
-
-def _deep(header: dict[str, Any], kinds: list[str]) -> str:
-    """Three axes of space, by their kinds, else by their directions or spacings; empty where one of
-    three is another, or there are more."""
-    axes = [i for i in range(len(header["sizes"])) if not kinds or kinds[i] not in _COLOUR]
-    if len(axes) != 3:
-        return ""
-    if kinds:
-        return "its three axes are of space" * all(kinds[i] in _SPACE for i in axes)
-    units = [str(unit) for unit in header.get("units", ())]
-    sides = np.array(header.get("spacings", ()), dtype=np.float64)
-    if np.isfinite(sides).sum() == 3 and not any(in_si(1.0, u, "s") for u in units if u):
-        return f"spacings {' '.join(f'{side:g}' for side in sides)}"
-    given = header.get("space directions")
-    rows = [] if given is None else [row for row in given if row is not None]
-    return "three space directions" * (len(rows) == 3 and bool(np.isfinite(rows).all()))
-
-
-def _spacing(header: dict[str, Any], kinds: list[str]) -> NDArray[np.float64]:
-    """From the spacings, or the lengths of the axes' directions, of the first two axes in space;
-    1 1 where none is stated."""
-    space = [i for i, kind in enumerate(kinds) if kind in _SPACE]
-    i, j = space[:2] if len(space) > 1 else (0, 1)
-    if "spacings" in header:
-        return np.asarray(header["spacings"], dtype=np.float64)[[i, j]]
-    directions = header.get("space directions")
-    if directions is None:
-        return np.ones(2)
-    return np.array([np.linalg.norm(directions[k]) for k in (i, j)], dtype=np.float64)
 
 
 def _require_end(path: Path, most: int) -> None:

@@ -94,7 +94,15 @@ def read_png_stack(folder: Path, options: Options) -> Recording:
     sizes are streams of their own.
     """
     if not {"m_per_px", "rate"} <= options.keys():
-        said = offered(_dots(folder)) if folder.is_dir() and "m_per_px" not in options else ""
+        said = ""
+        if folder.is_dir() and "m_per_px" not in options:
+            # Dots an inch of the first image (PNG specification, pHYs), where it states them.
+            first = head(numbered(folder)[0])
+            at = first.find(b"pHYs")
+            dots = np.empty(0)
+            if 0 <= at <= len(first) - 13 and first[at + 12] == 1:
+                dots = np.array(struct.unpack(">II", first[at + 4 : at + 12])) * 0.0254
+            said = offered(dots)
         raise UsageError(f"png-stack needs --m-per-px and --rate, e.g. 1e-4 and 10{said}")
     if not folder.is_dir():
         raise UsageError(f"{folder} is not a folder of PNG images")
@@ -148,15 +156,6 @@ def offered(dots: Floats) -> str:
     if np.isclose(dots[0], _PRINTERS, atol=0.05).any():
         return f"{stated}, as for printers and screens: not a scale"
     return f"{stated}: if the instrument wrote them, give --m-per-px {25.4 / dots[0]:.6g}mm"
-
-
-def _dots(folder: Path) -> Floats:
-    """Dots an inch of the first image (PNG specification, pHYs); none where it states none."""
-    first = head(numbered(folder)[0])
-    at = first.find(b"pHYs")
-    if at < 0 or len(first) < at + 13 or first[at + 12] != 1:
-        return np.empty(0)
-    return np.array(struct.unpack(">II", first[at + 4 : at + 12])) * 0.0254
 
 
 def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:

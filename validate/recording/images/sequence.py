@@ -6,7 +6,7 @@ and `ImageStatus`. Only what is OK enters the recording: a tool that was not see
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from validate.recording.reader import (
     length,
     source_of,
 )
-from validate.recording.types import Frames, Recording, Signal, Stream
+from validate.recording.types import Frames, Recording, Stream
 
 IMAGES = "images"
 MAX_PIXELS = 400 * 2**20  # bytes of all images of one sequence
@@ -86,13 +86,26 @@ def recorded(path: Path, held: Sequence, options: Options) -> Recording:
     never = []
     keys = {key for fields in held.fields.values() for key in fields}
     for tool in sorted(m[1] for key in keys if (m := _TOOL.fullmatch(key))):
-        found = _tool(path, held, tool, t)
-        streams |= found
-        never += [] if found else [tool]
+        # Both signals of a transform where its status is OK, or says nothing.
+        key = f"{tool}Transform"
+        texts = {
+            i: fields[key]
+            for i, fields in sorted(held.fields.items())
+            if key in fields and fields.get(f"{key}Status", "OK") == "OK"
+        }
+        if not texts:
+            never.append(tool)
+            continue
+        T = np.array([_numbers(path, text, 16, i) for i, text in texts.items()]).reshape(-1, 4, 4)
+        wrong = np.abs(T[:, 3] - [0, 0, 0, 1]).max(axis=1) > 1e-6
+        if wrong.any():
+            i = list(texts)[int(wrong.argmax())]
+            raise RecordingError(f"{path.name}: frame {i}: the last row of {key} is not 0 0 0 1")
+        R, x = T[:, :3, :3], _MM * T[:, :3, 3]
+        streams |= pose_signals(tool, t[list(texts)], R, x, tool.rpartition("To")[2])
     levels: dict[str, str] = {}
     if held.images and options.get("images") != "no":
-        turned, levels = _upright(path, held)
-        shown, levels["levels"] = _images(path, turned, t, options)
+        shown, levels = _images(path, held, t, options)
         streams |= shown
     if not streams:
         raise RecordingError(
@@ -151,35 +164,34 @@ def _numbers(path: Path, text: str, count: int, frame: int) -> Floats:
     return values
 
 
-def _tool(path: Path, held: Sequence, tool: str, t: Floats) -> dict[str, Signal]:
-    """Both signals of a transform where its status is OK, or says nothing."""
-    key = f"{tool}Transform"
-    texts = {
-        i: fields[key]
-        for i, fields in sorted(held.fields.items())
-        if key in fields and fields.get(f"{key}Status", "OK") == "OK"
-    }
-    if not texts:
-        return {}
-    T = np.array([_numbers(path, text, 16, i) for i, text in texts.items()]).reshape(-1, 4, 4)
-    wrong = np.abs(T[:, 3] - [0, 0, 0, 1]).max(axis=1) > 1e-6
-    if wrong.any():
-        i = list(texts)[int(wrong.argmax())]
-        raise RecordingError(f"{path.name}: frame {i}: the last row of {key} is not 0 0 0 1")
-    frame = tool.rpartition("To")[2]
-    return pose_signals(tool, t[list(texts)], T[:, :3, :3], _MM * T[:, :3, 3], frame)
-
-
 def _images(
     path: Path, held: Sequence, t: Floats, options: Options
-) -> tuple[dict[str, Frames], str]:
-    """Images whose status is OK, or says nothing, and how they became 8 bits deep."""
+) -> tuple[dict[str, Frames], dict[str, str]]:
+    """Images whose status is OK, or says nothing, as PLUS has them beside its transforms: columns
+    go to the marked side of the transducer, rows away from it. And what was turned, and how they
+    became 8 bits deep.
+
+    Raises `RecordingError` for lines along rows, as of radio-frequency data.
+    """
+    way, told = held.orientation.upper(), {}
+    across = along = 1
+    if way[:2] in ("MF", "MN", "UF", "UN"):
+        across, along = (-1 if way[0] == "U" else 1), (-1 if way[1] == "N" else 1)
+    elif way[:1] in ("F", "N") and way[1:2] in ("M", "U"):
+        raise RecordingError(
+            f"{path.name}: its scan lines are rows (orientation {way}); save it as MF, or "
+            f"give --map images=no"
+        )
+    sides = " and ".join((["columns"] if across < 0 else []) + (["rows"] if along < 0 else []))
+    if sides:
+        words = f"{sides} reversed: the file stores them as {way}, but its transforms need MF"
+        told[IMAGES] = words
     fields = [held.fields.get(i, {}) for i in range(len(held.images))]
     said = [f.get("ImageStatus", f.get("Status", "OK")) for f in fields]
     good = [i for i, status in enumerate(said) if status == "OK"]
     if not good:
-        return {}, "none"
-    images, levels = shallow([held.images[i] for i in good], options)
+        return {}, {**told, "levels": "none"}
+    images, levels = shallow([held.images[i][::along, ::across] for i in good], options)
     # Sides of a pixel, m.
     if "m_per_px" in options:
         side = length(options, "m_per_px", "0.1mm")
@@ -191,27 +203,5 @@ def _images(
                 f"m_per_px=0.1mm, or --map images=no for the transforms only"
             )
         pixel = _MM * held.spacing[0], _MM * held.spacing[1]
-    return {IMAGES: Frames(t[good], images, pixel, np.eye(4), "image")}, levels
-
-
-def _upright(path: Path, held: Sequence) -> tuple[Sequence, dict[str, str]]:
-    """The images as PLUS has them beside its transforms, and what was turned: columns go to the
-    marked side of the transducer, rows away from it.
-
-    Raises `RecordingError` for lines along rows, as of radio-frequency data.
-    """
-    way = held.orientation.upper()
-    if way[:2] not in ("MF", "MN", "UF", "UN"):
-        if way[:1] in ("F", "N") and way[1:2] in ("M", "U"):
-            raise RecordingError(
-                f"{path.name}: its scan lines are rows (orientation {way}); save it as MF, or "
-                f"give --map images=no"
-            )
-        return held, {}
-    across, along = (-1 if way[0] == "U" else 1), (-1 if way[1] == "N" else 1)
-    if across == along == 1:
-        return held, {}
-    turned = tuple(image[::along, ::across] for image in held.images)
-    sides = " and ".join((["columns"] if across < 0 else []) + (["rows"] if along < 0 else []))
-    told = f"{sides} reversed: the file stores them as {way}, but its transforms need MF"
-    return replace(held, images=turned), {IMAGES: told}
+    frames = Frames(t[good], images, pixel, np.eye(4), "image")
+    return {IMAGES: frames}, {**told, "levels": levels}

@@ -50,7 +50,13 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
     import cv2
 
     declared = (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
-    video = _opened(path)
+    # One thread: each takes address space, and a machine has many cores. A name of ours: FFmpeg
+    # takes one with % for a row of pictures.
+    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "protocol_whitelist;file"
+    with TemporaryDirectory(prefix="validate-") as folder:
+        link = Path(folder) / "video"
+        link.symlink_to(path.resolve())
+        video = cv2.VideoCapture(str(link), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
     wide = video.get(cv2.CAP_PROP_SAR_NUM)
     high = video.get(cv2.CAP_PROP_SAR_DEN)
     if wide > 0 and high > 0 and wide != high:
@@ -89,18 +95,6 @@ def arrays(path: Path, every: float = 1) -> dict[str, NDArray[Any]]:
     }
 
 
-def _opened(path: Path) -> Any:
-    """The video, by a name of ours: FFmpeg takes one with % for a row of pictures. One thread: each
-    takes address space, and a machine has many cores."""
-    import cv2
-
-    os.environ["OPENCV_FFMPEG_CAPTURE_OPTIONS"] = "protocol_whitelist;file"
-    with TemporaryDirectory(prefix="validate-") as folder:
-        link = Path(folder) / "video"
-        link.symlink_to(path.resolve())
-        return cv2.VideoCapture(str(link), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
-
-
 def _require_few(count: float, width: float, height: float, every: float) -> None:
     """What is declared, before anything is decoded: packed, it may be small."""
     if width * height * (count // every) > MOST:
@@ -135,7 +129,16 @@ def read_video(path: Path, options: Options) -> Recording:
         raise RecordingError(f"{path.name}: not a file")
     size, first = path.stat().st_size, head(path, 12)
     if _matroska(path):
-        at = _segment_end(path, size)
+        # Where the segment ends by its own account; a live stream tells none.
+        lead = head(path)
+        end, begin = _sized(lead, 4)
+        at = begin + (end or 0)
+        if lead[at : at + 4] != _SEGMENT:
+            raise RecordingError(
+                f"{path.name}: a Matroska header without its segment: truncated or damaged"
+            )
+        extent, begin = _sized(lead, at + 4)
+        at = size if extent is None else begin + extent
     else:
         at = (
             (8 + int(struct.unpack("<I", first[4:8])[0]) if len(first) >= 8 else 8)
@@ -190,20 +193,6 @@ def _times(path: Path, t: Floats, rate: float, every: int, options: Options) -> 
 
 def _matroska(path: Path) -> bool:
     return head(path, 4) == _EBML
-
-
-def _segment_end(path: Path, size: int) -> int:
-    """Where a Matroska file's segment ends by its own account; `size` where it tells none, as of a
-    live stream. Raises `RecordingError` where no segment follows the head."""
-    first = head(path)
-    end, begin = _sized(first, 4)
-    at = begin + (end or 0)
-    if first[at : at + 4] != _SEGMENT:
-        raise RecordingError(
-            f"{path.name}: a Matroska header without its segment: truncated or damaged"
-        )
-    count, begin = _sized(first, at + 4)
-    return size if count is None else begin + count
 
 
 def _sized(data: bytes, at: int) -> tuple[int | None, int]:

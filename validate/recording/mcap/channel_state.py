@@ -255,42 +255,32 @@ class ChannelSeen:
         if self.first is None:
             self._one_by_one(messages[:1])
             messages = messages[1:]
-        if self.schema == IMAGE:
-            self._take_pictures(messages)
-            return
-        for start in range(0, len(messages), _TOGETHER):
-            part = messages[start : start + _TOGETHER]
-            found = batch(self.schema, part) if self.first and not self.error else None
-            if found is not None and self._like_first(found):
-                self._stamps.frombytes(found.stamps_ns.tobytes())
-                self.count += len(part)
-                self.numbers += found.values.size
-            else:
+        together = _PICTURES if self.schema == IMAGE else _TOGETHER
+        for start in range(0, len(messages), together):
+            part, first = messages[start : start + together], self.first
+            if first is None or self.error:
                 self._one_by_one(part)
-
-    def _take_pictures(self, messages: Sequence[bytes]) -> None:
-        """Pictures like the first one are not unpacked; a run does that."""
-        for start in range(0, len(messages), _PICTURES):
-            part = messages[start : start + _PICTURES]
-            found = pictures(part) if self.first and not self.error else None
-            first = self.first.image if self.first else None
-            if found and self.first and first is not None and (found.frame, found.shape) == (
-                self.first.frame, first.shape
-            ):  # fmt: skip
-                self._stamps.frombytes(found.stamps_ns.tobytes())
-                self.count += len(part)
-                self.numbers += len(part) * self.first.size
-            else:
+                continue
+            # Those like the first one are not parsed one by one; a run unpacks pictures.
+            stamps_ns: Ints | None = None
+            if self.schema == IMAGE:
+                shown = pictures(part)
+                shape = None if first.image is None else first.image.shape
+                if shown and (shown.frame, shown.shape) == (first.frame, shape):
+                    stamps_ns, numbers = shown.stamps_ns, len(part) * first.size
+            elif (
+                (found := batch(self.schema, part))
+                and (found.frame, found.sd, found.names, found.unit)
+                == (first.frame, first.sd, first.names, first.unit)
+                and found.values.shape[1:] == first.values.shape
+            ):
+                stamps_ns, numbers = found.stamps_ns, found.values.size
+            if stamps_ns is None:
                 self._one_by_one(part)
-
-    def _like_first(self, found: Alike) -> bool:
-        first = self.first
-        return (
-            first is not None
-            and (found.frame, found.sd, found.names, found.unit)
-            == (first.frame, first.sd, first.names, first.unit)
-            and found.values.shape[1:] == first.values.shape
-        )
+            else:
+                self._stamps.frombytes(stamps_ns.tobytes())
+                self.count += len(part)
+                self.numbers += numbers
 
     def _one_by_one(self, messages: Sequence[bytes]) -> None:
         for data in messages:

@@ -31,11 +31,17 @@ def decoder_of(schema: Schema | None, channel: Channel) -> Decoder | str:
     encodings = (schema.encoding if schema else "", channel.encoding)
     try:
         if encodings == ("ros2msg", "cdr") and schema is not None:
+            from mcap_ros2.decoder import DecoderFactory as Ros2
+
             # Its library prints what it cannot parse.
             with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-                return _ros2(schema)
+                decode = Ros2().decoder_for("cdr", _theirs(schema))
+            return _of_library(decode, _plain_ros2, "ROS 2 message definition")
         if encodings == ("protobuf", "protobuf") and schema is not None:
-            return _protobuf(schema)
+            from mcap_protobuf.decoder import DecoderFactory as Protobuf
+
+            parse = Protobuf().decoder_for("protobuf", _theirs(schema))
+            return _of_library(parse, _plain_protobuf, "Protobuf schema")
         if channel.encoding == "json":
             return _guarded(_json)
         if channel.encoding == "cbor":
@@ -76,13 +82,12 @@ def _theirs(schema: Schema) -> TheirSchema:
     return TheirSchema(schema.id, schema.data, schema.encoding, schema.name)
 
 
-def _ros2(schema: Schema) -> Decoder:
-    from mcap_ros2.decoder import DecoderFactory
-
-    decode = DecoderFactory().decoder_for("cdr", _theirs(schema))
+def _of_library(
+    decode: Callable[[bytes], Any] | None, plain: Callable[[Any], Any], lacks: str
+) -> Decoder:
     if decode is None:
-        raise RecordingError("no ROS 2 message definition")
-    return _guarded(lambda data: _plain_ros2(decode(data)))
+        raise RecordingError(f"no {lacks}")
+    return _guarded(lambda data: plain(decode(data)))
 
 
 def _plain_ros2(value: Any) -> Any:
@@ -92,15 +97,6 @@ def _plain_ros2(value: Any) -> Any:
     if isinstance(value, (list, tuple)) and value and hasattr(value[0], "__slots__"):
         return [_plain_ros2(item) for item in value]
     return value
-
-
-def _protobuf(schema: Schema) -> Decoder:
-    from mcap_protobuf.decoder import DecoderFactory
-
-    decode = DecoderFactory().decoder_for("protobuf", _theirs(schema))
-    if decode is None:
-        raise RecordingError("no Protobuf schema")
-    return _guarded(lambda data: _plain_protobuf(decode(data)))
 
 
 def _plain_protobuf(message: Any) -> Any:

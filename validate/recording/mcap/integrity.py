@@ -190,8 +190,23 @@ class _Walk:
         if self.size == 0:
             raise RecordingError("the file is empty")
         self._magic("first")
-        while self._record() != Op.FOOTER:
-            pass
+        opcode = None
+        while opcode != Op.FOOTER:
+            self.record_at = self._at
+            head = self._read(HEAD.size)
+            opcode, length = HEAD.unpack(head)
+            if length > self.size - self._at:
+                left = self.size - self._at
+                short = _ShortError if length <= MAX_RECORD else RecordingError
+                raise short(f"a record declares {length} bytes where the file has {left} left")
+            if length > MAX_RECORD:
+                raise RecordingError(f"a record of {length} bytes, the limit is {MAX_RECORD}")
+            content = self._read(length)
+            self._take(opcode, head, content)
+            self._sums.update(head)
+            self._sums.update(content)
+            if opcode == Op.DATA_END:
+                self._sums.restart()
         self.record_at = self._at
         self._magic("last")
         if self._at != self.size:
@@ -224,24 +239,6 @@ class _Walk:
             kind = _ShortError if which == "last" and MAGIC.startswith(got) else RecordingError
             raise kind(f"the {which} 8 bytes are not the MCAP magic ({got.hex()})")
         self._sums.update(got)
-
-    def _record(self) -> int:
-        self.record_at = self._at
-        head = self._read(HEAD.size)
-        opcode, length = HEAD.unpack(head)
-        if length > self.size - self._at:
-            left = self.size - self._at
-            short = _ShortError if length <= MAX_RECORD else RecordingError
-            raise short(f"a record declares {length} bytes where the file has {left} left")
-        if length > MAX_RECORD:
-            raise RecordingError(f"a record of {length} bytes, the limit is {MAX_RECORD}")
-        content = self._read(length)
-        self._take(opcode, head, content)
-        self._sums.update(head)
-        self._sums.update(content)
-        if opcode == Op.DATA_END:
-            self._sums.restart()
-        return int(opcode)
 
     def _take(self, opcode: int, head: bytes, content: bytes) -> None:
         if (opcode == Op.HEADER) != (self._header is None):
@@ -290,7 +287,23 @@ class _Walk:
                 self._spans.append(Span(at, len(content), False, frozenset([channel])))
                 self._hand_on()
             case Op.CHUNK:
-                self._take_chunk(content)
+                chunk = Chunk.read(content)
+                channels: set[int] = set()
+                for inner, at, end in records_in(chunk.data):
+                    if inner == _MESSAGE:
+                        channels.add(self._count(chunk.data, at, end))
+                    elif inner == Op.SCHEMA:
+                        self._take_schema(chunk.data[at:end])
+                    elif inner == Op.CHANNEL:
+                        self._take_channel(chunk.data[at:end])
+                    elif inner in _KNOWN:
+                        raise RecordingError(f"a {Op(inner).name} record inside a chunk")
+                self._hand_on()
+                self.chunks += 1
+                self._compressions[chunk.compression or "none"] += 1
+                self._chunk_places.add((self.record_at, HEAD.size + len(content)))
+                at = self._at - len(content)
+                self._spans.append(Span(at, len(content), True, frozenset(channels)))
             case Op.ATTACHMENT:
                 found = Attachment.read(content)
                 begin = self._at - len(content)
@@ -345,25 +358,6 @@ class _Walk:
             if messages and self._taker is not None:
                 self._taker.take(channel, messages)
                 self._kept[channel] = []
-
-    def _take_chunk(self, content: bytes) -> None:
-        chunk = Chunk.read(content)
-        channels: set[int] = set()
-        for opcode, at, end in records_in(chunk.data):
-            if opcode == _MESSAGE:
-                channels.add(self._count(chunk.data, at, end))
-            elif opcode == Op.SCHEMA:
-                self._take_schema(chunk.data[at:end])
-            elif opcode == Op.CHANNEL:
-                self._take_channel(chunk.data[at:end])
-            elif opcode in _KNOWN:
-                raise RecordingError(f"a {Op(opcode).name} record inside a chunk")
-        self._hand_on()
-        self.chunks += 1
-        self._compressions[chunk.compression or "none"] += 1
-        self._chunk_places.add((self.record_at, HEAD.size + len(content)))
-        at = self._at - len(content)
-        self._spans.append(Span(at, len(content), True, frozenset(channels)))
 
     def found(self, path: Path) -> Verified:
         assert self._header is not None  # any other first record was refused

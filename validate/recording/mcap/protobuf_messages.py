@@ -70,15 +70,12 @@ def _file() -> Any:
     for name, fields in _FIELDS.items():
         message = made.message_type.add(name=name.removeprefix("validate."))
         for number, (field, kind) in enumerate(fields.items(), start=1):
-            message.field.add(name=field, number=number, **_typed(kind))
+            entry = message.field.add(name=field, number=number)
+            many = kind in (_TEXTS, _NUMBERS)
+            entry.label = entry.LABEL_REPEATED if many else entry.LABEL_OPTIONAL
+            if kind == _STAMP:
+                entry.type = entry.TYPE_MESSAGE
+                entry.type_name = f".{timestamp_pb2.Timestamp.DESCRIPTOR.full_name}"
+            else:
+                entry.type = entry.TYPE_STRING if kind in (_TEXT, _TEXTS) else entry.TYPE_DOUBLE
     return made
-
-
-def _typed(kind: str) -> dict[str, Any]:
-    field = descriptor_pb2.FieldDescriptorProto
-    label = field.LABEL_REPEATED if kind in (_TEXTS, _NUMBERS) else field.LABEL_OPTIONAL
-    if kind == _STAMP:
-        stamp = timestamp_pb2.Timestamp.DESCRIPTOR.full_name
-        return {"label": label, "type": field.TYPE_MESSAGE, "type_name": f".{stamp}"}
-    text = kind in (_TEXT, _TEXTS)
-    return {"label": label, "type": field.TYPE_STRING if text else field.TYPE_DOUBLE}

@@ -14,7 +14,6 @@ need an index find none.
 
 import zlib
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
@@ -23,11 +22,11 @@ from validate.errors import RecordingError, UsageError
 from validate.files import ANY_SIZE
 from validate.recording.clocks.alignment import moved
 from validate.recording.mcap.integrity import verify
-from validate.recording.mcap.records import HEAD, MAGIC, Cut, Op, Verified, messages_of, opened
+from validate.recording.mcap.records import HEAD, MAGIC, Cut, Op, messages_of, opened
 from validate.recording.mcap.schemas import by_name, name_of, own_records
 from validate.recording.mcap.streams import fill, not_ours, ours, stream_of
-from validate.recording.mcap.third_party_channels import ForeignStreams, found_streams, gatherers
 from validate.recording.mcap.third_party_channels import fill as fill_foreign
+from validate.recording.mcap.third_party_channels import found_streams, gatherers
 from validate.recording.mcap.write import replacing
 from validate.recording.reader import (
     M_PER_PX,
@@ -105,17 +104,13 @@ def read_all(path: Path, options: Options) -> Recording:
     stream.
     """
     factor, _ = metres(options, "m", path.name)
-    found = _read_all(path, {key: value for key, value in options.items() if key != "unit"})
-    return found if factor == 1 else in_unit(found, options["unit"], factor)
-
-
-def _read_all(path: Path, options: Options) -> Recording:
+    others = {key: value for key, value in options.items() if key != "unit"}
     with opened(path) as stream:
         verified = verify(stream, path)
-        gathered, never = gatherers(verified, options)
+        gathered, never = gatherers(verified, others)
         try:
             fill_foreign(gathered, messages_of(stream, verified, gathered.keys()))
-            found = found_streams(gathered, options)
+            found = found_streams(gathered, others)
         except RecordingError as error:
             raise RecordingError(f"{path.name}: {error}") from None
     never = {**never, **found.never}
@@ -125,30 +120,23 @@ def _read_all(path: Path, options: Options) -> Recording:
         raise RecordingError(
             f"{path.name}: none of its messages can be read as a stream; {why or 'empty'}"
         )
-    return _together(path, verified, own, found, never)
-
-
-def _together(
-    path: Path,
-    verified: Verified,
-    own: Recording | None,
-    found: ForeignStreams,
-    never: Mapping[str, str],
-) -> Recording:
-    """Own and foreign streams on one clock."""
+    # Own and foreign streams on one clock.
     begins = [int(ns[0]) for ns in found.ns.values()] + ([own.t0_ns] if own else [])
     t0 = min(begins)
     streams = {topic: make(t0) for topic, make in found.make.items()}
-    told = {**found.told, "library": verified.header.library, "profile": verified.header.profile}
     if own is None:
+        header = verified.header
+        told = {**found.told, "library": header.library, "profile": header.profile}
         records = {**by_name(verified.metadata), "provenance": told}
-        return Recording(path.stem, verified.source, t0, **by_kind(streams), clock=found.clocks,
-                         metadata=records, unread=never)  # fmt: skip
-    own = moved(own, (own.t0_ns - t0) / 1e9)
-    return replace(
-        own, t0_ns=t0, **by_kind({**own.streams, **streams}), clock={**own.clock, **found.clocks},
-        unread=never,
-    )  # fmt: skip
+        whole = Recording(path.stem, verified.source, t0, **by_kind(streams), clock=found.clocks,
+                          metadata=records, unread=never)  # fmt: skip
+    else:
+        own = moved(own, (own.t0_ns - t0) / 1e9)
+        whole = replace(
+            own, t0_ns=t0, **by_kind({**own.streams, **streams}),
+            clock={**own.clock, **found.clocks}, unread=never,
+        )  # fmt: skip
+    return whole if factor == 1 else in_unit(whole, options["unit"], factor)
 
 
 OPTIONS = (
@@ -200,38 +188,37 @@ def recover(path: Path, out: Path) -> Recovered:
         log = [ns for ns in verified.log_ns.values() if len(ns)]
         first, last = min(int(ns.min()) for ns in log), max(int(ns.max()) for ns in log)
         source = verified.source
+        # What the bytes after the whole part still tell.
+        cut, size = verified.cut, source.bytes
+        after = "how many messages followed is not known"
+        if cut.ended:
+            missing = f"no message: only the summary is truncated, at byte {cut.at}"
+        elif cut.at == size:
+            missing = f"the end of the data after byte {cut.at}; {after}"
+        else:
+            stream.seek(cut.at)
+            head = stream.read(HEAD.size + 16)
+            missing = f"{size - cut.at} bytes of a cut record at byte {cut.at}"
+            if len(head) == HEAD.size + 16 and head[0] == Op.CHUNK:
+                declared = HEAD.unpack_from(head)[1]
+                start, end = (int.from_bytes(head[k : k + 8], "little") for k in (9, 17))
+                missing += (
+                    f", a chunk of {declared} bytes with log times {start} ns to {end} ns, up to "
+                    f"{(end - last) / 1e9:.6f} s after the last saved message"
+                )
+            missing = f"{missing}; {after}"
         told = {
             "from": f"{source.path}, sha256 {source.sha256}",
             "saved": f"{verified.messages} messages, {(last - first) / 1e9:.6f} s from {first} ns "
-            f"to {last} ns, the first {verified.cut.data} of {source.bytes} bytes",
-            "missing": _missing(stream, source.bytes, verified.cut, last),
+            f"to {last} ns, the first {cut.data} of {size} bytes",
+            "missing": missing,
         }
         with replacing(out) as target:
             pairs = b"".join(_text(text) for pair in told.items() for text in pair)
             content = _text(RECORD) + len(pairs).to_bytes(4, "little") + pairs
-            _copy(stream, target, verified.cut, HEAD.pack(Op.METADATA, len(content)) + content)
+            _copy(stream, target, cut, HEAD.pack(Op.METADATA, len(content)) + content)
     counts = {c.topic: len(verified.log_ns[n]) for n, c in verified.channels.items()}
     return Recovered(counts, tuple(f"{key}: {value}" for key, value in told.items()))
-
-
-def _missing(stream: BinaryIO, size: int, cut: Cut, last: int) -> str:
-    """What the bytes after the whole part still tell."""
-    if cut.ended:
-        return f"no message: only the summary is truncated, at byte {cut.at}"
-    after = "how many messages followed is not known"
-    if cut.at == size:
-        return f"the end of the data after byte {cut.at}; {after}"
-    stream.seek(cut.at)
-    head = stream.read(HEAD.size + 16)
-    found = f"{size - cut.at} bytes of a cut record at byte {cut.at}"
-    if len(head) == HEAD.size + 16 and head[0] == Op.CHUNK:
-        declared = HEAD.unpack_from(head)[1]
-        start, end = (int.from_bytes(head[k : k + 8], "little") for k in (9, 17))
-        found += (
-            f", a chunk of {declared} bytes with log times {start} ns to {end} ns, up to "
-            f"{(end - last) / 1e9:.6f} s after the last saved message"
-        )
-    return f"{found}; {after}"
 
 
 def _text(text: str) -> bytes:

@@ -198,7 +198,13 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
         if _text(message, "format") != "png":
             raise RecordingError(f"image format {message['format']!r}, readable: 'png'")
         ns, frame = _stamp_ns(message, "timestamp"), _text(message, "frame_id")
-        return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(_picture(message)))
+        picture = _field(message, "data")
+        if not isinstance(picture, bytes):  # as those of Protobuf are
+            try:
+                picture = base64.b64decode(_text(message, "data"), validate=True)
+            except (binascii.Error, ValueError) as error:
+                raise RecordingError(f"field 'data' is not base64 ({error})") from None
+        return Sample(ns, frame, 0.0, (), "", np.empty(0), decode_png(picture))
     names: tuple[str, ...] = ()
     unit = ""
     if schema == MARKERS:
@@ -227,16 +233,6 @@ def decode(schema: str, data: bytes, parse: Parse = parse_json) -> Sample:
 
 def _number(message: Json, name: str) -> float:
     return float(_array(name, [_field(message, name)], {int, float})[0])
-
-
-def _picture(message: Json) -> bytes:
-    data = _field(message, "data")
-    if isinstance(data, bytes):  # of Protobuf
-        return data
-    try:
-        return base64.b64decode(_text(message, "data"), validate=True)
-    except (binascii.Error, ValueError) as error:
-        raise RecordingError(f"field 'data' is not base64 ({error})") from None
 
 
 def _no_constant(token: str) -> float:

@@ -6,16 +6,17 @@ put in the order of their stamps; how many were not is told. What is no stream i
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Ints
 from validate.errors import RecordingError, UsageError
 from validate.recording.images.image import shallow
-from validate.recording.mcap.decoders import Plain, decoder_of
+from validate.recording.mcap.decoders import Decoder, Plain, decoder_of
 from validate.recording.mcap.known_messages import MessagePart, parts_of, stamp_ns
-from validate.recording.mcap.records import Channel, Message, Schema, Verified
+from validate.recording.mcap.records import Channel, Message, Verified
 from validate.recording.mcap.schemas import MIRROR_OF
 from validate.recording.mcap.streams import MAX_NUMBERS, ours
 from validate.recording.reader import Options, length
@@ -27,6 +28,7 @@ SCALE, WHITE = "m_per_px", "white"
 
 
 Sample = tuple[MessagePart, int, int]  # and when it was published and logged, ns
+_Known = Callable[[Plain], Iterable[MessagePart]]
 
 
 @dataclass
@@ -73,32 +75,29 @@ def gatherers(verified: Verified, options: Options) -> tuple[dict[int, Gathered]
         if number in own or MIRROR_OF in channel.metadata or not len(verified.log_ns[number]):
             continue
         asked = {k: u for k, u in fields.items() if k.startswith(f"{channel.topic}.")}
-        parts = _parts(verified.schemas.get(channel.schema_id), channel, asked)
-        if isinstance(parts, str):
-            never[channel.topic] = parts
+        schema = verified.schemas.get(channel.schema_id)
+        decode = decoder_of(schema, channel)
+        known: _Known | None = parts_of(schema.name if schema else "")
+        if asked:
+            known = _fields(channel.topic, asked)
+        if isinstance(decode, str):
+            never[channel.topic] = decode
+        elif known is not None:
+            found[number] = Gathered(channel, partial(_parts, decode, known))
         else:
-            found[number] = Gathered(channel, parts)
+            kind = schema.name if schema else "no schema"
+            never[channel.topic] = (
+                f"messages of unknown meaning ({kind}); import a number with "
+                f"--map {channel.topic}.FIELD=UNIT"
+            )
     return found, never
 
 
-def _parts(
-    schema: Schema | None, channel: Channel, asked: Mapping[str, str]
-) -> Callable[[bytes], Iterable[MessagePart]] | str:
-    """What takes a channel's messages apart, or why nothing does."""
-    decode = decoder_of(schema, channel)
-    if isinstance(decode, str):
-        return decode
-    known = _fields(channel.topic, asked) if asked else parts_of(schema.name if schema else "")
-    if known is None:
-        name = schema.name if schema else "no schema"
-        return (
-            f"messages of unknown meaning ({name}); import a number with "
-            f"--map {channel.topic}.FIELD=UNIT"
-        )
-    return lambda data: known(decode(data))
+def _parts(decode: Decoder, known: _Known, data: bytes) -> Iterable[MessagePart]:
+    return known(decode(data))
 
 
-def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[MessagePart]]:
+def _fields(topic: str, asked: Mapping[str, str]) -> _Known:
     """Parts of the named fields, stamped by a header where there is one."""
 
     def parts(message: Plain) -> Iterable[MessagePart]:
@@ -108,21 +107,17 @@ def _fields(topic: str, asked: Mapping[str, str]) -> Callable[[Plain], Iterable[
         for key, unit in asked.items():
             path = key.removeprefix(topic)
             factor, si = si_of(unit)
-            values = factor * _numbers(_at(message, path[1:]), key)
-            yield MessagePart(path, ns, frame or "topic", values, unit=si)
+            found = _at(message, path[1:])
+            if isinstance(found, dict):
+                below = ", ".join(f"{key}.{name}" for name in sorted(found))
+                raise RecordingError(f"'{key}' holds fields; name one: {below}")
+            try:
+                values = np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()
+            except (TypeError, ValueError):
+                raise RecordingError(f"'{key}' is {str(found)[:40]!r}, not numbers") from None
+            yield MessagePart(path, ns, frame or "topic", factor * values, unit=si)
 
     return parts
-
-
-def _numbers(found: Any, key: str) -> Floats:
-    """The numbers (c,) of a field; raises `RecordingError` for one that holds others, or text."""
-    if isinstance(found, dict):
-        below = ", ".join(f"{key}.{name}" for name in sorted(found))
-        raise RecordingError(f"'{key}' holds fields; name one: {below}")
-    try:
-        return np.atleast_1d(np.asarray(found, dtype=np.float64)).ravel()
-    except (TypeError, ValueError):
-        raise RecordingError(f"'{key}' is {str(found)[:40]!r}, not numbers") from None
 
 
 def _at(message: Any, path: str) -> Any:
@@ -197,30 +192,26 @@ def found_streams(gathered: Mapping[int, Gathered], options: Options) -> Foreign
                 unset = f"{int(zero.sum())} stamps of 0: replaced by the publish time"
             order = np.argsort(times, kind="stable")
             moved = int((order != np.arange(len(order))).sum())
-            try:
-                parts, levels = _shallow([samples[i][0] for i in order], options)
-            except RecordingError as error:
-                never[topic] = str(error)
-                continue
+            # Images deeper than 8 bits become so.
+            parts, levels = [samples[i][0] for i in order], ""
+            deep = [part.image for part in parts if part.image is not None]
+            if any(image.dtype != np.uint8 for image in deep):
+                try:
+                    images, levels = shallow(deep, options)
+                except RecordingError as error:
+                    never[topic] = str(error)
+                    continue
+                parts = [replace(p, image=i) for p, i in zip(parts, images, strict=True)]
             late = f"{moved} of {len(order)} samples were not in the order of their stamps"
             if notes := [*filter(None, (levels, late if moved else "", gone, unset))]:
                 told[topic] = "; ".join(notes)
             ns[topic] = times[order]
-            make[topic] = _maker(parts, ns[topic], side)
+            make[topic] = partial(_stream, parts, ns[topic], side)
             clocks[topic] = clock_of(
                 topic, ns[topic], *(np.array([s[k] for s in samples], np.int64)[order]
                                     for k in (1, 2)),
             )  # fmt: skip
     return ForeignStreams(make, ns, clocks, told, never)
-
-
-def _shallow(parts: list[MessagePart], options: Options) -> tuple[list[MessagePart], str]:
-    """Images in 8 bits, and how they became so; nothing of what is so deep, or no image."""
-    deep = [part.image for part in parts if part.image is not None]
-    if all(image.dtype == np.uint8 for image in deep):
-        return parts, ""
-    images, levels = shallow(deep, options)
-    return [replace(p, image=image) for p, image in zip(parts, images, strict=True)], levels
 
 
 def _by_size(
@@ -256,18 +247,14 @@ def _why_none(parts: list[MessagePart], side: float | None) -> str:
     return ""
 
 
-def _maker(parts: list[MessagePart], ns: Ints, side: float | None) -> Callable[[int], Stream]:
-    def make(t0: int) -> Stream:
-        t, first = (ns - t0) / 1e9, parts[0]
-        frame = first.frame or "not stated"
-        if first.image is not None and side is not None:
-            images = tuple(p.image for p in parts if p.image is not None)
-            return Frames(t, images, (side, side), np.eye(4), frame)
-        values = np.stack([p.values for p in parts])
-        if first.names:
-            return Markers(
-                t, first.names, np.where(np.isfinite(values), values, np.nan), 0.0, frame
-            )
-        return Signal(t, values, first.unit, 0.0, frame)
-
-    return make
+def _stream(parts: list[MessagePart], ns: Ints, side: float | None, t0: int) -> Stream:
+    """The stream of samples at `ns`, on a clock that begins at `t0` ns."""
+    t, first = (ns - t0) / 1e9, parts[0]
+    frame = first.frame or "not stated"
+    if first.image is not None and side is not None:
+        images = tuple(p.image for p in parts if p.image is not None)
+        return Frames(t, images, (side, side), np.eye(4), frame)
+    values = np.stack([p.values for p in parts])
+    if first.names:
+        return Markers(t, first.names, np.where(np.isfinite(values), values, np.nan), 0.0, frame)
+    return Signal(t, values, first.unit, 0.0, frame)

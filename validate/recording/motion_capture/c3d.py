@@ -174,7 +174,19 @@ def _streams(
     for part, why in parts:
         streams |= part
         never |= why
-    return streams, {"kind": "motion capture (C3D)", **told, **_trial(found)}, never
+    told = {"kind": "motion capture (C3D)", **told}
+    told["first_frame"] = f"{int(found['first_frame'])} of the trial, time 0 here"
+    # Events as the file states them; its times count as the trial's, which may begin earlier
+    times = 60 * found["event_times"][0] + found["event_times"][1]
+    names = distinct(found["events"].tolist(), len(times))
+    if listed := "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True)):
+        told["events"] = f"{listed} (events of the trial, listed but not stored as a stream)"
+    if (left := int(found["uncounted"])) > BLOCK:
+        told[LEFT_OUT] = (
+            f"{left} bytes after frame {MOST}: its header cannot count further, and no parameter "
+            f"does"
+        )
+    return streams, told, never
 
 
 def _require_whole(path: Path) -> None:
@@ -210,26 +222,6 @@ def _require_whole(path: Path) -> None:
                 f"{path.name}: its parameter {word!r} declares {told:.3g} values, but {size - at} "
                 "bytes are left: damaged"
             )
-
-
-def _trial(found: Held) -> Record:
-    """Its first frame and events, and what of a long one no parameter counts."""
-    left = int(found["uncounted"])
-    # Events as the file states them; its times count as the trial's, which may begin earlier
-    times = 60 * found["event_times"][0] + found["event_times"][1]
-    names = distinct(found["events"].tolist(), len(times))
-    listed = "; ".join(f"{name} {t:.6g} s" for name, t in zip(names, times, strict=True))
-    told = {
-        "first_frame": f"{int(found['first_frame'])} of the trial, time 0 here",
-    }
-    if listed:
-        told["events"] = f"{listed} (events of the trial, listed but not stored as a stream)"
-    if left > BLOCK:
-        told[LEFT_OUT] = (
-            f"{left} bytes after frame {MOST}: its header cannot count further, and no parameter "
-            f"does"
-        )
-    return told
 
 
 def _recognises(path: Path) -> bool:

@@ -179,6 +179,11 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
         header = found["header"]
         rates = [header["points"]["frame_rate"], _rate(parameters, "ANALOG", held[0]["analog"]),
                  _rate(parameters, "ROTATION", held[0]["poses"])]  # fmt: skip
+        # Labels of events, each after its context (Left, Right), where as many are stated.
+        events, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
+        if len(sides) == len(events):
+            both = zip(sides.tolist(), events.tolist(), strict=True)
+            events = np.array([f"{side} {label}".strip() for side, label in both], dtype=str)
         # Minutes and seconds (2, n), as a file has them; none of what is shaped otherwise.
         group = parameters.get("EVENT", {})
         times = np.asarray(group["TIMES"]["value"] if "TIMES" in group else [], dtype=np.float64)
@@ -198,50 +203,37 @@ def arrays(path: Path) -> dict[str, NDArray[Any]]:
             "outputs": np.array(pairs, dtype=str).reshape(-1, 2),
             "first_frame": np.array(header["points"]["first_frame"] + 1),
             "uncounted": np.array(size - lies.at(max(frames, MOST)) if lies.frames == MOST else 0),
-            "events": _event_names(parameters),
+            "events": events,
             "event_times": times if times.ndim == 2 and len(times) == 2 else np.empty((2, 0)),
         }
 
 
 def _frames(found: Any) -> dict[str, NDArray[Any]]:
     """What the file holds frame by frame, times first."""
-    data = found["data"]
+    data, parameters = found["data"], found["parameters"]
+    analog = np.asarray(data["analogs"][0].T, dtype=np.float64)
+    # The library takes whole numbers without a sign for signed ones.
+    whole = float(_numbers(parameters, "POINT", "SCALE", 1)[0]) > 0
+    words = _words(parameters, "ANALOG", "FORMAT")[:1]
+    if analog.size and whole and [w.upper() for w in words] == ["UNSIGNED"]:
+        many = analog.shape[1]
+        each = _numbers(parameters, "ANALOG", "SCALE", many)
+        each = each * _numbers(parameters, "ANALOG", "GEN_SCALE", 1)[0]
+        offset = _numbers(parameters, "ANALOG", "OFFSET", many)
+        raw = np.rint(analog / np.where(each == 0, 1.0, each) + offset)
+        analog = np.asarray((raw % _WORD - offset % _WORD) * each)
     return {
         "points": np.transpose(data["points"][:3], (2, 1, 0)),
         "residuals": data["meta_points"]["residuals"][0].T,
-        "analog": _analog(found["parameters"], data["analogs"][0].T),
+        "analog": analog,
         "poses": np.transpose(data["rotations"], (3, 2, 0, 1)),
     }
-
-
-def _analog(parameters: Any, found: NDArray[Any]) -> NDArray[np.float64]:
-    """Samples in their units. The library takes whole numbers without a sign for signed ones."""
-    values = np.asarray(found, dtype=np.float64)
-    whole = float(_numbers(parameters, "POINT", "SCALE", 1)[0]) > 0
-    words = _words(parameters, "ANALOG", "FORMAT")[:1]
-    if not (values.size and whole and [w.upper() for w in words] == ["UNSIGNED"]):
-        return values
-    many = values.shape[1]
-    each = _numbers(parameters, "ANALOG", "SCALE", many)
-    each = each * _numbers(parameters, "ANALOG", "GEN_SCALE", 1)[0]
-    offset = _numbers(parameters, "ANALOG", "OFFSET", many)
-    raw = np.rint(values / np.where(each == 0, 1.0, each) + offset)
-    return np.asarray((raw % _WORD - offset % _WORD) * each)
 
 
 def _numbers(parameters: Any, group: str, name: str, many: int) -> NDArray[np.float64]:
     """The first numbers of a parameter and its continuations; where too few, a scale of 1."""
     held = [float(v) for v in _values(parameters, group, name)][:many]
     return np.array(held + [1.0] * (many - len(held)))
-
-
-def _event_names(parameters: Any) -> NDArray[Any]:
-    """Labels, each after its context (Left, Right), where as many are stated."""
-    labels, sides = (_words(parameters, "EVENT", name) for name in ("LABELS", "CONTEXTS"))
-    if len(sides) != len(labels):
-        return labels
-    pairs = zip(sides.tolist(), labels.tolist(), strict=True)
-    return np.array([f"{side} {label}".strip() for side, label in pairs], dtype=str)
 
 
 def _rate(parameters: Any, group: str, samples: NDArray[np.float64]) -> float:

@@ -13,9 +13,8 @@ from datetime import date
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from validate.arrays import Floats, Ints
+from validate.arrays import Floats
 from validate.errors import RecordingError, UsageError
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals, rotations
@@ -190,7 +189,11 @@ def read_ndi(path: Path, options: Options) -> Recording:
     seen, or damaged.
     """
     held = text_rows(path)
-    header = _header(held)
+    header = next((row for row in held.rows if tools_of(row)), None)
+    if header is None:
+        raise RecordingError(
+            f"{held.name}: no line names position and quaternion of a tool (x y z q0 qx qy qz)"
+        )
     tools, above = tools_of(header), fields_above(held, header)
     options = {**({"rate": above["frequency"]} if "frequency" in above else {}), **options}
     clock = clock_of_columns(header)
@@ -215,10 +218,17 @@ def read_ndi(path: Path, options: Options) -> Recording:
     streams: dict[str, Stream] = {}
     told = {}
     good = (options["ok"].lower(),) if "ok" in options else _OK
-    for name, k, own in _tracks(tools, whose):
+    # Name, group of columns and numbers of the lines of each tool.
+    tracks = [(tool.name, k, np.arange(len(rows))) for k, tool in enumerate(tools)]
+    if len(names := dict.fromkeys(whose)) > 1:
+        of_line = np.array(whose)
+        tracks = [(name or "unnamed", 0, np.flatnonzero(of_line == name)) for name in names]
+    for name, k, own in tracks:
         pose = values[own, 7 * k : 7 * k + 7]
         pose = np.where(np.abs(pose) < NONE, pose, np.nan)
-        seen = _seen(pose, tools[k], [rows[i] for i in own], good)
+        seen = ~np.isnan(pose).any(axis=1) & (pose != 0).any(axis=1)
+        if (state := tools[k].state) is not None:
+            seen &= np.array([rows[i].cell(state).lower() in good for i in own])
         told[name] = f"{int((~seen).sum())} of {len(seen)}"
         if seen.any():
             R = rotations(pose[seen, 3:], f"{path.name}: {name}")
@@ -248,14 +258,6 @@ def _whose(header: TextRow, rows: Sequence[TextRow], tools: Sequence[Tool]) -> l
             if 1 < len(set(names)) <= min(_MOST_TOOLS, len(names) // 2):
                 return names
     return [""] * len(rows)
-
-
-def _tracks(tools: Sequence[Tool], whose: Sequence[str]) -> list[tuple[str, int, Ints]]:
-    """Name, group of columns and numbers of the lines of each tool."""
-    every = np.array(whose)
-    if len(names := dict.fromkeys(whose)) > 1:
-        return [(name or "unnamed", 0, np.flatnonzero(every == name)) for name in names]
-    return [(tool.name, k, np.arange(len(whose))) for k, tool in enumerate(tools)]
 
 
 def _recording(
@@ -299,15 +301,6 @@ def _second(cell: str, first: int) -> str:
     return f"{3600 * hours + 60 * int(found[5]) + float(found[6].replace(',', '.')):.9f}"
 
 
-def _header(held: TextRows) -> TextRow:
-    for row in held.rows:
-        if tools_of(row):
-            return row
-    raise RecordingError(
-        f"{held.name}: no line names position and quaternion of a tool (x y z q0 qx qy qz)"
-    )
-
-
 def _times(
     held: TextRows,
     values: Floats,
@@ -333,16 +326,6 @@ def _times(
         raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; damaged")
     t = t + _DAY * np.concatenate(([0.0], np.cumsum(np.diff(t) < -_DAY / 2)))
     return np.asarray(np.rint(1e9 * (t - t[0])) / 1e9)
-
-
-def _seen(
-    pose: Floats, tool: Tool, rows: Sequence[TextRow], ok: Sequence[str]
-) -> NDArray[np.bool_]:
-    """Which rows (n,) hold a pose."""
-    good: NDArray[np.bool_] = ~np.isnan(pose).any(axis=1) & (pose != 0).any(axis=1)
-    if tool.state is not None:
-        good &= np.array([row.cell(tool.state).lower() in ok for row in rows])
-    return good
 
 
 def _recognises(path: Path) -> bool:

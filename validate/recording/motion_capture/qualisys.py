@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.streams import begun, distinct, recorded
 from validate.recording.motion_capture.poses import pose_signals
@@ -228,7 +227,16 @@ def _bodies(
         seen = ~np.isnan(one).any(axis=1) & (one[:, _RESIDUAL] >= 0) & one[:, _TURN:].any(axis=1)
         told[name] = f"{int((~seen).sum())} of {len(seen)}"
         if seen.any():
-            R = _turned(f"{path.name}: {name}", one[seen, _TURN:])
+            # Rotations stand column by column.
+            R = np.swapaxes(one[seen, _TURN:].reshape(-1, 3, 3), 1, 2)
+            off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+            bad = (off > _ROUND) | (np.linalg.det(R) < 0)
+            if bad.any():
+                raise RecordingError(
+                    f"{path.name}: {name}: sample {int(bad.argmax()) + 1} is not a rotation (error "
+                    f"{off[bad.argmax()]:.3g}); expected the columns of Qualisys 6D, or the file "
+                    "is damaged"
+                )
             streams |= pose_signals(name, t[seen], R, factor * one[seen, :3], frame)
     if not streams:
         raise RecordingError(f"{path.name}: no body is visible: {told}")
@@ -242,19 +250,6 @@ def _bodies(
     }
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, begun(streams), record, unread)
-
-
-def _turned(what: str, columns: Floats) -> Floats:
-    """Rotations (n, 3, 3) that stand column by column; raises `RecordingError` for others."""
-    R = np.swapaxes(columns.reshape(-1, 3, 3), 1, 2)
-    off = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
-    bad = (off > _ROUND) | (np.linalg.det(R) < 0)
-    if bad.any():
-        raise RecordingError(
-            f"{what}: sample {int(bad.argmax()) + 1} is not a rotation (error "
-            f"{off[bad.argmax()]:.3g}); expected the columns of Qualisys 6D, or the file is damaged"
-        )
-    return np.asarray(R)
 
 
 QUALISYS = Reader(

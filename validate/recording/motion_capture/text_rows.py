@@ -9,6 +9,7 @@ import csv
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -99,7 +100,16 @@ def numbers(
     fewer cells, or its last number fewer decimals, than all others. Raises `RecordingError` for a
     cell that is no number, one too many, and without rows.
     """
-    whole, left = _whole(held, rows, width)
+    # The rows without an unfinished last one.
+    whole, left = rows, ""
+    if rows and held.open_end and rows[-1] is held.rows[-1]:
+        last, others = rows[-1], rows[:-1]
+        fewest = min((len(r.cells) for r in others), default=width)
+        cells = [r.cell(len(last.cells) - 1) for r in others]
+        if len(last.cells) < min(fewest, width):
+            whole, left = others, f"line {last.line}{_CUT}{len(last.cells)} of {width} cells"
+        elif cells and _decimals(last.cells[-1]) < min(map(_decimals, cells)):
+            whole, left = others, f"line {last.line}{_CUT}its last number is '{last.cells[-1]}'"
     if not whole:
         raise RecordingError(f"{held.name}: no row of numbers below its header; cut or damaged")
     for row in whole:
@@ -116,11 +126,19 @@ def numbers(
     try:
         found = np.array(texts, dtype=np.float64)
     except ValueError:
-        raise RecordingError(f"{held.name}: {_first_odd(whole, wanted)}") from None
+        for row, i in product(whole, wanted):
+            try:
+                float(_plain(row.cell(i)))
+            except ValueError:
+                raise RecordingError(
+                    f"{held.name}: line {row.line}: '{row.cell(i)[:40]}' is not a number; correct "
+                    "or remove it"
+                ) from None
+        raise RecordingError(f"{held.name}: a cell is no number") from None
     if np.isinf(found).any():
         at = int(np.argmax(np.isinf(found).any(axis=1)))
         raise RecordingError(f"{held.name}: line {whole[at].line} has an infinite number")
-    return found, tuple(whole), left
+    return found, tuple(whole), (left,) if left else ()
 
 
 def _plain(cell: str) -> str:
@@ -150,34 +168,6 @@ def without_zeros(x: Floats) -> tuple[Floats, int]:
 def told_zeros(count: int) -> dict[str, str]:
     """Return the record's entry about points that are three zeros; none where none is."""
     return {ZEROS: f"{count} points, taken as missing"} if count else {}
-
-
-def _first_odd(rows: Sequence[TextRow], columns: Sequence[int]) -> str:
-    for row in rows:
-        for i in columns:
-            try:
-                float(_plain(row.cell(i)))
-            except ValueError:
-                return (
-                    f"line {row.line}: '{row.cell(i)[:40]}' is not a number; correct or remove it"
-                )
-    return "a cell is no number"
-
-
-def _whole(
-    held: TextRows, rows: Sequence[TextRow], width: int
-) -> tuple[Sequence[TextRow], tuple[str, ...]]:
-    """The rows without an unfinished last one."""
-    if not rows or not held.open_end or rows[-1] is not held.rows[-1]:
-        return rows, ()
-    last, others = rows[-1], rows[:-1]
-    fewest = min((len(r.cells) for r in others), default=width)
-    if len(last.cells) < min(fewest, width):
-        return others, (f"line {last.line}{_CUT}{len(last.cells)} of {width} cells",)
-    cells = [r.cell(len(last.cells) - 1) for r in others]
-    if cells and _decimals(last.cells[-1]) < min(map(_decimals, cells)):
-        return others, (f"line {last.line}{_CUT}its last number is '{last.cells[-1]}'",)
-    return rows, ()
 
 
 def _decimals(cell: str) -> int:

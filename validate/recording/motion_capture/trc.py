@@ -4,12 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from validate.arrays import Floats
 from validate.errors import RecordingError
 from validate.recording.formats.streams import distinct, recorded
 from validate.recording.motion_capture.text_rows import (
     ASSUMED,
-    TextRows,
     as_number,
     numbers,
     text_rows,
@@ -70,7 +68,25 @@ def read_trc(path: Path, options: Options) -> Recording:
     shown, zeros = without_zeros(values[:, _BEFORE:].reshape(len(values), -1, 3))
     x = whole_points(held, shown, names, rows)
     factor, stated = metres(options, header.get("Units", ""), path.name)
-    t, counted = _times(held, header, values, options)
+    # Seconds from the first row. Rows of equal times, as of three decimals at 2 kHz, are counted at
+    # the header's rate where they stand by it.
+    counted = {}
+    if "rate" in options:
+        t = np.arange(len(values)) / above_zero(options, "rate")
+    else:
+        t = np.asarray(values[:, 1] - values[0, 1])
+        if np.isnan(t).any():
+            raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; give "
+                                 f"--map rate=HZ")  # fmt: skip
+        if not (np.diff(t) > 0).all():
+            rate = as_number(header.get("DataRate", "")) or np.nan
+            exact = np.arange(len(t)) / rate
+            if not (rate > 0 and np.abs(t - exact).max() <= _ROUNDED):
+                row = int(np.argmax(np.diff(t) <= 0)) + 2
+                raise RecordingError(f"{held.name}: the time of row {row} is not after the one "
+                                     f"before it; give --map rate=HZ")  # fmt: skip
+            words = f"rows of equal times are counted at the {rate:g} Hz that the file declares"
+            t, counted = exact, {ASSUMED: words}
     markers = Markers(t, names, factor * x, spread(options), options.get("frame", "capture"))
     told = {
         "kind": "marker trajectories (TRC)",
@@ -82,30 +98,6 @@ def read_trc(path: Path, options: Options) -> Recording:
     source = source_of(path, "text file: integrity not provable")
     told |= counted | told_zeros(zeros) | told_left(left)
     return recorded(path.stem, source, {"markers": markers}, told)
-
-
-def _times(
-    held: TextRows, header: dict[str, str], values: Floats, options: Options
-) -> tuple[Floats, dict[str, str]]:
-    """Seconds from the first row, and what was assumed: rows of equal times, as of three decimals
-    at 2 kHz, are counted at the header's rate where they stand by it."""
-    if "rate" in options:
-        return np.arange(len(values)) / above_zero(options, "rate"), {}
-    t = values[:, 1] - values[0, 1]
-    if np.isnan(t).any():
-        raise RecordingError(f"{held.name}: {int(np.isnan(t).sum())} rows without a time; give "
-                             f"--map rate=HZ")  # fmt: skip
-    if (np.diff(t) > 0).all():
-        return np.asarray(t), {}
-    rate = as_number(header.get("DataRate", "")) or np.nan
-    exact = np.arange(len(t)) / rate
-    if not (rate > 0 and np.abs(t - exact).max() <= _ROUNDED):
-        row = int(np.argmax(np.diff(t) <= 0)) + 2
-        raise RecordingError(f"{held.name}: the time of row {row} is not after the one before it; "
-                             f"give --map rate=HZ")  # fmt: skip
-    return exact, {
-        ASSUMED: f"rows of equal times are counted at the {rate:g} Hz that the file declares"
-    }
 
 
 TRC = Reader(

@@ -79,15 +79,24 @@ def read_vicon(path: Path, options: Options) -> Recording:
     held = text_rows(path)
     # Blocks by title, numbered where one stands twice; one without rows is left out.
     begins = [i for i, row in enumerate(held.rows) if row.cell(0) in _TITLES and _lone(row)]
-    found: dict[str, CsvBlock] = {}
+    blocks: dict[str, CsvBlock] = {}
     titles: Counter[str] = Counter()
     for begin, end in pairwise([*begins, len(held.rows)]):
         title = held.rows[begin].cell(0)
-        block = _block(held, held.rows[begin:end]) if title != _EVENTS else None
-        if block is not None:
-            titles[title] += 1
-            found[title if titles[title] == 1 else f"{title} ({titles[title]})"] = block
-    blocks = found
+        if title == _EVENTS or end - begin < 6:
+            continue
+        _, rate, names, columns, units, *values = held.rows[begin:end]
+        hz = as_number(rate.cell(0)) or 0.0
+        if not 0 < hz < np.inf:
+            raise RecordingError(
+                f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is not a rate in Hz; damaged"
+            )
+        last = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
+        width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)
+        titles[title] += 1
+        blocks[title if titles[title] == 1 else f"{title} ({titles[title]})"] = CsvBlock(
+            hz, names.cells, columns.cells[:width], units.cells, tuple(values[:last])
+        )
     streams: dict[str, Stream] = {}
     told = {"kind": "motion capture (Vicon CSV)"}
     if _POINTS in blocks:
@@ -99,7 +108,14 @@ def read_vicon(path: Path, options: Options) -> Recording:
         signals, more = _signals(held, block, title.removeprefix(_DEVICES), options)
         streams |= signals
         told |= more | told_left([r[LEFT_OUT] for r in (told, more) if LEFT_OUT in r])
-    told |= _events(held)
+    # Events: rows of subject, context, name and time below their title, rate and names.
+    first = next((i for i, r in enumerate(held.rows) if r.cell(0) == _EVENTS and _lone(r)), None)
+    rows = held.rows[first + 3 :] if first is not None else ()
+    last = next((i for i, r in enumerate(rows) if not any(r.cells)), len(rows))
+    events = [f"{' '.join(filter(None, r.cells[1:3]))} {r.cell(3)} s" for r in rows[:last]]
+    if events:
+        listed = "; ".join(events)
+        told["events"] = f"{listed} (events of the trial, listed but not stored as a stream)"
     if not streams:
         raise RecordingError(
             f"{path.name}: neither trajectories nor devices; it has "
@@ -114,35 +130,8 @@ def read_vicon(path: Path, options: Options) -> Recording:
     return recorded(path.stem, source, begun(streams), told, unread)
 
 
-def _events(held: TextRows) -> dict[str, str]:
-    """Rows of subject, context, name and time below their title, rate and names."""
-    begin = next((i for i, r in enumerate(held.rows) if r.cell(0) == _EVENTS and _lone(r)), None)
-    rows = held.rows[begin + 3 :] if begin is not None else ()
-    end = next((i for i, r in enumerate(rows) if not any(r.cells)), len(rows))
-    told = [f"{' '.join(filter(None, r.cells[1:3]))} {r.cell(3)} s" for r in rows[:end]]
-    return (
-        {"events": f"{'; '.join(told)} (events of the trial, listed but not stored as a stream)"}
-        if told
-        else {}
-    )
-
-
 def _lone(row: TextRow) -> bool:
     return not any(row.cells[1:])
-
-
-def _block(held: TextRows, rows: tuple[TextRow, ...]) -> CsvBlock | None:
-    if len(rows) < 6:
-        return None
-    _, rate, names, columns, units, *values = rows
-    hz = as_number(rate.cell(0)) or 0.0
-    if not 0 < hz < np.inf:
-        raise RecordingError(
-            f"{held.name}: line {rate.line}: '{rate.cell(0)[:20]}' is not a rate in Hz; damaged"
-        )
-    end = next((i for i, r in enumerate(values) if not any(r.cells)), len(values))
-    width = max((i + 1 for i, c in enumerate(columns.cells) if c), default=0)
-    return CsvBlock(hz, names.cells, columns.cells[:width], units.cells, tuple(values[:end]))
 
 
 def _points(held: TextRows, block: CsvBlock, options: Options) -> tuple[Markers, Mapping[str, str]]:

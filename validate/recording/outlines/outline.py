@@ -67,10 +67,12 @@ def quality(grey: Grey, wall: Wall) -> Quality:
     total = gaussian_filter1d(np.where(seen, values, 0).sum(axis=1), width, mode="wrap")
     count = gaussian_filter1d(seen.sum(axis=1).astype(float), width, mode="wrap")
     step = total / np.maximum(count, 1e-9) - np.nanmedian(within[0])
-    return Quality(
-        _gcnr(within[0], beside[0]),
-        float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0,
-    )
+    closed = float((step > np.median(step) / 3).mean()) if np.median(step) > 0 else 0.0
+    edges = np.linspace(0, 256, 33)
+    a, b = (np.histogram(v[~np.isnan(v)], edges)[0] for v in (within[0], beside[0]))
+    apart = a.sum() and b.sum()
+    gcnr = float(1 - np.minimum(a / a.sum(), b / b.sum()).sum()) if apart else 0.0
+    return Quality(gcnr, closed)
 
 
 def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floats]:
@@ -78,14 +80,6 @@ def _band(grey: Grey, wall: Wall, low: float, high: float) -> tuple[Floats, Floa
     shares = np.sqrt(np.linspace(low**2, high**2, 24))  # equal areas
     away = wall.radius[:, None, None] * shares[None, :, None] * DIRECTIONS[:, None, :]
     return grey.at(wall.centre + away), shares
-
-
-def _gcnr(inside: Floats, outside: Floats) -> float:
-    edges = np.linspace(0, 256, 33)
-    a, b = (np.histogram(v[~np.isnan(v)], edges)[0] for v in (inside, outside))
-    if not (a.sum() and b.sum()):
-        return 0.0
-    return float(1 - np.minimum(a / a.sum(), b / b.sum()).sum())
 
 
 def wall_sd(grey: Grey, wall: Wall) -> float:
@@ -251,55 +245,44 @@ def _darkened(image: NDArray[np.uint8], m_per_px: tuple[float, float], bright: b
     return Grey(dark, m_per_px, speckle_area(dark, m_per_px))
 
 
-def _starts(
+def _walls(
     grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
-) -> list[tuple[Floats, float]]:
+) -> Iterator[tuple[Wall, Quality]]:
+    """Walls traced from every start, the most promising first, after two rounds each."""
     if radius is not None and not 0 < radius < np.inf:
         raise RecordingError(f"rough radius {radius} m: expected a positive number")
     if centre is None:
         found = candidates(scanned(grey.image), grey.m_per_px)
-        return [(c.centre, c.radius if radius is None else radius) for c in found]
-    place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
-    if np.isnan(grey.at(place[None])).any():
-        height, width = 1e3 * np.array(grey.image.shape) * grey.m_per_px[::-1]
-        raise RecordingError(
-            f"rough centre ({1e3 * place[0]:.2f}, {1e3 * place[1]:.2f}) mm lies outside the image "
-            f"of {width:.1f} x {height:.1f} mm; it is measured from the first pixel"
-        )
-    if radius is not None:
-        return [(place, radius)]
-    sides = np.array(grey.image.shape[::-1]) * np.array(grey.m_per_px)
-    largest = _ROUGH_RADIUS * float(sides.min())
-    return [(place, largest * factor) for factor in (0.25, 0.5, 1.0, 1.5)]
-
-
-def _walls(
-    grey: Grey, centre: Sequence[float] | Floats | None, radius: float | None
-) -> Iterator[tuple[Wall, Quality]]:
-    """Walls traced from every start, the most promising first."""
-    starts = _starts(grey, centre, radius)
+        starts = [(c.centre, c.radius if radius is None else radius) for c in found]
+    else:
+        place = checked(np.asarray(centre), "rough centre [m]", (2,), error=RecordingError)
+        if np.isnan(grey.at(place[None])).any():
+            height, width = 1e3 * np.array(grey.image.shape) * grey.m_per_px[::-1]
+            raise RecordingError(
+                f"rough centre ({1e3 * place[0]:.2f}, {1e3 * place[1]:.2f}) mm lies outside the "
+                f"image of {width:.1f} x {height:.1f} mm; it is measured from the first pixel"
+            )
+        sides = np.array(grey.image.shape[::-1]) * np.array(grey.m_per_px)
+        largest = _ROUGH_RADIUS * float(sides.min())
+        radii = [largest * f for f in (0.25, 0.5, 1.0, 1.5)] if radius is None else [radius]
+        starts = [(place, rough) for rough in radii]
     if not starts:
         raise RecordingError("no closed dark region: no disc is darker than its surroundings")
-    for start in _ranked(grey, starts):
-        wall = trace(grey, *start)
-        yield wall, quality(grey, wall)
-
-
-def _strength(wall: Wall, judged: Quality) -> float:
-    return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
-
-
-def _ranked(grey: Grey, starts: list[tuple[Floats, float]]) -> list[tuple[Floats, float]]:
-    """The starts, the most promising first, after two rounds each."""
-    if len(starts) == 1:
-        return starts
 
     def rank(start: tuple[Floats, float]) -> tuple[bool, float]:
         wall = trace(grey, *start, rounds=2)
         q = quality(grey, wall)
         return not _refusal(wall, q), _strength(wall, q)
 
-    return sorted(starts, key=rank, reverse=True)
+    if len(starts) > 1:
+        starts.sort(key=rank, reverse=True)
+    for start in starts:
+        wall = trace(grey, *start)
+        yield wall, quality(grey, wall)
+
+
+def _strength(wall: Wall, judged: Quality) -> float:
+    return float(judged.gcnr * judged.closed * np.sqrt(max(wall.evidence, 0.0)))
 
 
 def _refusal(wall: Wall, judged: Quality) -> str:
@@ -426,15 +409,27 @@ def followed(
             f"(t = {frames.t[i]:.3f} s): {why}"
         )
     first = next(iter(found))
-    rivals, beside = _rivals(frames, first, found[first], hint)
+    # Other regions as distinct: those that may be meant, and those beside the centre that was
+    # given, which neither hold it nor are nearer to it than the outline.
+    outline = found[first]
+    others = rivals_of(
+        frames.images[first], frames.m_per_px, outline, radius=hint.radius, bright=hint.bright
+    )
+    alike = [replace(r, share=min(r.share, 1.0)) for r in others if r.share >= SIMILAR]
+    rivals, beside = alike, list[RivalRegion]()
+    if (centre := hint.centre) is not None:
+        own = float(np.linalg.norm(outline.centre - centre))
+        near = [bool(np.linalg.norm(r.centre - centre) < max(r.radius, own)) for r in alike]
+        rivals = [r for r, at in zip(alike, near, strict=True) if at]
+        beside = [r for r, at in zip(alike, near, strict=True) if not at]
     doubt = 1 - max((r.share for r in rivals), default=0.0) / 2
     each = np.array([(EXPERTS * o.sd, doubt * o.closed * o.contrast) for o in found.values()])
-    _require_sure(rivals, float(each[0, 1]), least)
+    _require_sure(tuple(rivals), float(each[0, 1]), least)
     contours = Contours(
         frames.t[list(found)], tuple(o.points for o in found.values()),
         rms(each[:, 0]), frames.pose, frames.frame, images, each,
     )  # fmt: skip
-    return FollowedOutline(contours, rivals, beside, without)
+    return FollowedOutline(contours, tuple(rivals), tuple(beside), without)
 
 
 def _next(
@@ -450,22 +445,6 @@ def _next(
             f"{1e3 * last.radius:.1f} mm: it is another region"
         )
     return outline
-
-
-def _rivals(
-    frames: Frames, i: int, outline: Outline, hint: Hint
-) -> tuple[tuple[RivalRegion, ...], tuple[RivalRegion, ...]]:
-    """Other regions as distinct: those that may be meant, and those beside the centre that was
-    said, which neither hold it nor are nearer to it than the outline."""
-    image, scale = frames.images[i], frames.m_per_px
-    found = rivals_of(image, scale, outline, radius=hint.radius, bright=hint.bright)
-    alike = [replace(r, share=min(r.share, 1.0)) for r in found if r.share >= SIMILAR]
-    if hint.centre is None:
-        return tuple(alike), ()
-    said, own = hint.centre, float(np.linalg.norm(outline.centre - hint.centre))
-    near = [bool(np.linalg.norm(r.centre - said) < max(r.radius, own)) for r in alike]
-    meant = tuple(r for r, at in zip(alike, near, strict=True) if at)
-    return meant, tuple(r for r, at in zip(alike, near, strict=True) if not at)
 
 
 def _require_sure(rivals: tuple[RivalRegion, ...], confidence: float, least: float) -> None:

@@ -57,7 +57,11 @@ def foreign_outlines(
             + (f"image {beyond[0]} among them" if beyond else "none")
             + f"; '{images}' has the images 0 to {len(frames.images) - 1}"
         )
-    scale = _scale(path, frames, unit)
+    metres = None if unit == "px" else in_si(1.0, unit, "m")
+    if unit != "px" and metres is None:
+        raise UsageError(f"unit {unit} of {path.name}: expected px, or a unit of length as mm")
+    drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
+    scale = np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
     at = sorted(found)
     outlines = tuple(found[i] * scale for i in at)
     # No point far off its image: then the unit is another, or the images are.
@@ -73,14 +77,6 @@ def foreign_outlines(
     return Contours(frames.t[at], outlines, sd, frames.pose, frames.frame, images)
 
 
-def _scale(path: Path, frames: Frames, unit: str) -> Floats:
-    metres = None if unit == "px" else in_si(1.0, unit, "m")
-    if unit != "px" and metres is None:
-        raise UsageError(f"unit {unit} of {path.name}: expected px, or a unit of length as mm")
-    drawn = path.is_dir() or path.suffix.lower() in (".png", ".npy", ".npz", ".nrrd")
-    return np.array(frames.m_per_px if metres is None or drawn else (metres, metres))
-
-
 def _read(path: Path, frames: Frames, label: str) -> Outlines:
     try:
         files = numbered(path, (".png", ".json")) if path.is_dir() else [path]
@@ -89,56 +85,21 @@ def _read(path: Path, frames: Frames, label: str) -> Outlines:
             raise UsageError(f"{path.name}: outlines come as {', '.join(KINDS)} or a folder")
         if (size := sum(file.stat().st_size for file in files)) > MAX_FILE:
             raise RecordingError(f"{path.name}: {size} bytes, limit {MAX_FILE}")
-        if kind == ".csv":
-            if label:
-                raise UsageError(f"--label {label}: {path.name} has no labels; leave it out")
-            return _table(path)
         if kind == ".json":
             return _polygons(path, files, frames, label)
-        named: dict[str, int] = {}
-        if kind == ".nrrd":
-            # Masks (n, h, w) of an NRRD (w, h, n), or (w, h) of one image: x first, as it is
-            # stored; the values of regions by name, as 3D Slicer has them.
-            held = decoded("validate.recording.images.nrrd", path)
-            masks: Any = held["pixels"]
-            if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
-                raise RecordingError(
-                    f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) "
-                    "of whole numbers"
-                )
-            texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
-            for key, text in texts.items():
-                name = f"{key.removesuffix('LabelValue')}Name"
-                if key.endswith("LabelValue") and name in texts and text.isdigit():
-                    named[texts[name]] = int(text)
-            masks = masks.T if masks.ndim == 3 else masks.T[None]
-        else:
-            masks = (
-                [decode_png(read_bytes(file, MAX_FILE)) for file in files]
-                if kind == ".png"
-                else _array(path)
-            )
-        # The masks of one region: of the only value that is not zero, or of that which is said.
-        values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
-        if len(values) > _MOST:
-            raise RecordingError(
-                f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other "
-                "value"
-            )
-        names = {v: name for name, v in named.items()}
-        regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
-        meant = values[_meant(path, label, regions)] if values else 0
-        masks = [mask == meant for mask in masks] if values else masks
-        _require_each(path, len(masks), "masks", len(frames.images))
-        shape, found = frames.images[0].shape, {}
-        for i, mask in enumerate(masks):
-            if mask.shape != shape:
-                raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
-            if mask.any():
-                found[i] = _edge(mask, f"{path.name}: mask {i}")
-        return found
+        if kind != ".csv":
+            return _edges(path, files, frames, label)
+        if label:
+            raise UsageError(f"--label {label}: {path.name} has no labels; leave it out")
+        text = read_text(path, MAX_FILE, "utf-8-sig")
     except OSError as error:
         raise RecordingError(f"{path.name}: cannot be read ({error.strerror})") from error
+    rows = csv.DictReader(io.StringIO(text, newline=""))
+    names = [str(name).strip().lower() for name in rows.fieldnames or ()]
+    if not {"frame", "x", "y"} <= set(names):
+        raise RecordingError(f"{path.name}: columns {names}, expected frame, x, y")
+    rows.fieldnames = names
+    return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
 # --- masks ----------------------------------------------------------------------------------------
@@ -173,6 +134,56 @@ def _require_each(path: Path, count: int, what: str, images: int) -> None:
         )
 
 
+def _edges(path: Path, files: list[Path], frames: Frames, label: str) -> Outlines:
+    """The edges (k, 2) px of masks (n, h, w), or (h, w) of one image."""
+    kind, named = files[0].suffix.lower(), dict[str, int]()
+    masks: Any
+    if kind == ".png":
+        masks = [decode_png(read_bytes(file, MAX_FILE)) for file in files]
+    elif kind == ".nrrd":
+        # x first, as it is stored; the values of regions by name, as 3D Slicer has them.
+        held = decoded("validate.recording.images.nrrd", path)
+        masks = held["pixels"]
+        if masks.ndim not in (2, 3) or masks.dtype.kind not in "biu":
+            raise RecordingError(
+                f"{path.name}: {masks.shape} {masks.dtype}, expected masks (w, h, n) or (w, h) "
+                "of whole numbers"
+            )
+        texts = dict(zip(held["keys"].tolist(), held["texts"].tolist(), strict=True))
+        for key, text in texts.items():
+            name = f"{key.removesuffix('LabelValue')}Name"
+            if key.endswith("LabelValue") and name in texts and text.isdigit():
+                named[texts[name]] = int(text)
+        masks = masks.T if masks.ndim == 3 else masks.T[None]
+    else:
+        masks = _array(path)
+    # The masks of one region: of the only value that is not zero, or of that which is said.
+    values = sorted({float(v) for mask in masks for v in np.unique(mask) if v})
+    if len(values) > _MOST:
+        raise RecordingError(
+            f"{path.name}: {len(values)} values, not a mask of regions: use 0 and one other value"
+        )
+    names = {v: name for name, v in named.items()}
+    regions = [(names.get(int(v), f"{v:g}"), f"{v:g}") for v in values]
+    meant = values[_meant(path, label, regions)] if values else 0
+    masks = [mask == meant for mask in masks] if values else masks
+    _require_each(path, len(masks), "masks", len(frames.images))
+    shape, found = frames.images[0].shape, {}
+    for i, mask in enumerate(masks):
+        if mask.shape != shape:
+            raise RecordingError(f"{path.name}: mask {i} is {mask.shape}, its image {shape}")
+        if mask.any():
+            padded = np.pad(mask.astype(np.float64), 1)
+            lines = contourpy.contour_generator(z=padded).lines(0.5)
+            if len(lines) != 1:
+                raise RecordingError(
+                    f"{path.name}: mask {i}: {len(lines)} closed lines, expected one region, no "
+                    "holes"
+                )
+            found[i] = np.asarray(lines[0])[:-1] - 1
+    return found
+
+
 def _array(path: Path) -> Any:
     if path.suffix.lower() == ".npz":
         held = npz_arrays(path, MAX_FILE)
@@ -189,26 +200,7 @@ def _array(path: Path) -> Any:
     return masks if masks.ndim == 3 else masks[None]
 
 
-def _edge(inside: Any, what: str) -> Floats:
-    """The edge (k, 2) px of the one region of a mask."""
-    padded = np.pad(inside.astype(np.float64), 1)
-    lines = contourpy.contour_generator(z=padded).lines(0.5)
-    if len(lines) != 1:
-        raise RecordingError(f"{what}: {len(lines)} closed lines, expected one region, no holes")
-    return np.asarray(lines[0])[:-1] - 1
-
-
 # --- points ---------------------------------------------------------------------------------------
-
-
-def _table(path: Path) -> Outlines:
-    text = read_text(path, MAX_FILE, "utf-8-sig")
-    rows = csv.DictReader(io.StringIO(text, newline=""))
-    names = [str(name).strip().lower() for name in rows.fieldnames or ()]
-    if not {"frame", "x", "y"} <= set(names):
-        raise RecordingError(f"{path.name}: columns {names}, expected frame, x, y")
-    rows.fieldnames = names
-    return _grouped(path, ((r["frame"], (r["x"], r["y"])) for r in rows))
 
 
 def _polygons(path: Path, files: list[Path], frames: Frames, label: str) -> Outlines:

@@ -282,9 +282,8 @@ def _blocks(split: Split) -> list[TextBlock]:
     above: list[Line] = list(lines[: tops[0]])
     small: list[str] = []
     for k, top in enumerate(tops):
-        names, units, zone = _below(lines, tops, k)
         last = k + 1 == len(tops)
-        rows, tail = (zone, []) if last and sizes[k] >= least else _parted(zone)
+        names, units, rows, tail = _below(lines, tops, k, to_end=last and sizes[k] >= least)
         if sizes[k] < least:
             # Words amid samples, with a few more samples below, are no table of their own.
             width = max(len(cells) for _, cells in rows)
@@ -317,24 +316,23 @@ def _size(lines: Sequence[Line], tops: Sequence[int], k: int) -> int:
 
 
 def _below(
-    lines: Sequence[Line], tops: Sequence[int], k: int
-) -> tuple[Line, list[str], list[Line]]:
-    """Names, units and the lines below them, up to the next table's names."""
+    lines: Sequence[Line], tops: Sequence[int], k: int, *, to_end: bool
+) -> tuple[Line, list[str], list[Line], list[Line]]:
+    """Names, units, the rows below them, all of them `to_end`, and the header lines of the next
+    table; a damaged row at the end is a row."""
     end = tops[k + 1] if k + 1 < len(tops) else len(lines)
     start = tops[k] + 1
     units: list[str] = []
     while start < end and (is_unit_row(lines[start][1]) or lines[start][1] == lines[tops[k]][1]):
         units = units or lines[start][1]
         start += 1
-    return lines[tops[k]], units, list(lines[start:end])
-
-
-def _parted(zone: list[Line]) -> tuple[list[Line], list[Line]]:
-    """The rows, and the header lines of the next table; a damaged row at the end is a row."""
-    end = len(zone)
-    while end and not is_data(zone[end - 1][1]) and is_remark(zone[end - 1][1]):
-        end -= 1
-    return zone[:end], zone[end:]
+    stop = end
+    while not to_end and stop > start:
+        cells = lines[stop - 1][1]
+        if is_data(cells) or not is_remark(cells):
+            break
+        stop -= 1
+    return lines[tops[k]], units, list(lines[start:stop]), list(lines[stop:end])
 
 
 def _stacked(block: TextBlock) -> list[TextBlock]:

@@ -173,9 +173,18 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
         labels = ", ".join(repr(c.label) for c in table.columns[:_NAMED])
         if (more := len(table.columns) - _NAMED) > 0:
             labels += f" and {more} more"
-        other = _by_unit(role, table) or f" or, where it was not logged, --map {role}=none"
-        if role == "time":
+        # A column without a known name may have the unit of a strain or stress.
+        derived = {"displacement": "strain", "force": "stress"}.get(role, "")
+        known = [c for c in table.columns if derived and not role_of(c) and _measures(c, derived)]
+        if known:
+            other = (
+                f" or, if '{known[0].label}' is a {derived}, --map '{derived}={known[0].label}' "
+                f"--map {_SIZE_OF[role]}"
+            )
+        elif role == "time":
             other = " or, at a constant rate, --map time=every:0.1s"
+        else:
+            other = f" or, where it was not logged, --map {role}=none"
         raise MissingColumnError(
             f"no {role} column among {labels}; name it with --map {role}=COLUMN{other}"
         )
@@ -192,18 +201,6 @@ def needed_pick(role: str, table: Table, said: Said | None) -> Pick:
                 f"{', '.join(repr(p.column.label) for p in picks)}; choose with --map {role}=COLUMN"
             )
     return first
-
-
-def _by_unit(role: str, table: Table) -> str:
-    """The advice where a column without a known name has the unit of a strain or stress."""
-    derived = {"displacement": "strain", "force": "stress"}.get(role, "")
-    other = [c for c in table.columns if derived and not role_of(c) and _measures(c, derived)]
-    if not other:
-        return ""
-    return (
-        f" or, if '{other[0].label}' is a {derived}, --map '{derived}={other[0].label}' "
-        f"--map {_SIZE_OF[role]}"
-    )
 
 
 def unnamed_column(role: str, table: Table) -> str:
@@ -325,15 +322,6 @@ def timed_pick(role: str, table: Table, said: Said | None) -> Pick:
     """
     if said is None or said.column != "every":
         return needed_pick(role, table, said)
-    step, unit = _step(said)
-    values = np.arange(len(table.lines), dtype=np.float64) * step
-    factor = si_factor(unit, "time")
-    return Pick(
-        role, Column(f"every {said.unit}", "", unit, ()), unit, factor, values * factor, said
-    )
-
-
-def _step(said: Said) -> tuple[float, str]:
     text = (said.unit or "").strip()
     digits = text.rstrip("abcdefghijklmnopqrstuvwxyz ")
     try:
@@ -342,7 +330,12 @@ def _step(said: Said) -> tuple[float, str]:
         step = 0.0
     if not (np.isfinite(step) and step > 0) or digits == text:
         raise UsageError(f"--map time=every:{text}: expected a step with its unit, as every:0.1s")
-    return step, text[len(digits) :].strip()
+    unit = text[len(digits) :].strip()
+    values = np.arange(len(table.lines), dtype=np.float64) * step
+    factor = si_factor(unit, "time")
+    return Pick(
+        role, Column(f"every {said.unit}", "", unit, ()), unit, factor, values * factor, said
+    )
 
 
 # --- sign of compression in a force-displacement table, and columns to invert --------------------

@@ -214,7 +214,10 @@ def _of_line(row: TextRow, below: list[TextRow]) -> PointLayout | None:
         below,
         frames=next((i for i in at if all(_is_count(r.cell(i)) for r in below)), None),
     )
-    if layout.instant is not None and (whose := _whose(names, layout)) is not None:
+    # The column with several labels, each in several rows; one that numbers the rows is none.
+    often = {i: len({row.cell(i) for row in below}) for i in _labels(names)}
+    whose = next((i for i, count in often.items() if 1 < count < len(below)), None)
+    if layout.instant is not None and whose is not None:
         return replace(layout, whose=whose)
     label = next(iter(_labels(names)), None)
     return replace(layout, label=label if list(points) == [_ALONE] and time is None else None)
@@ -232,15 +235,6 @@ def _labels(names: Sequence[str]) -> list[int]:
 
 def _is_count(cell: str) -> bool:
     return (as_number(cell) or 0.5).is_integer() or as_number(cell) == 0
-
-
-def _whose(names: Sequence[str], layout: PointLayout) -> int | None:
-    """The column with several labels, each in several rows; one that numbers the rows is none."""
-    for i in _labels(names):
-        often = Counter(row.cell(i) for row in layout.rows)
-        if 1 < len(often) < len(layout.rows):
-            return i
-    return None
 
 
 def _of_deeplabcut(rows: Sequence[TextRow]) -> PointLayout | None:
@@ -336,11 +330,7 @@ def read_point_table(path: Path, options: Options) -> Recording:
             "places at one instant, not the motion of one point; add a column called name (a "
             "landmark per row), or for a single point a column called time"
         )
-    x = _points(held, layout, values, rows)
-    x, unsure = _without_unsure(layout, x, values, options)
-    factor, stated = _scale(held, layout, options)
-    third = factor if x.shape[2] == len(AXES) else 1.0
-    x = _with_third(held, x, options) * np.array([factor, factor, third])
+    x, stated, unsure = _coordinates(held, layout, values, rows, options)
     landmarks = layout.label is not None
     t = np.zeros(1) if landmarks else _times(held, layout, values, options)
     if landmarks:
@@ -358,63 +348,79 @@ def read_point_table(path: Path, options: Options) -> Recording:
     if layout.whose is not None:
         t, names, x = _by_instants(held, layout, rows, t, x)
     markers = Markers(t, names, x, spread(options), options.get("frame", "capture"))
+    taken = {*layout.columns, *layout.sure, layout.instant, layout.label, layout.whose}
+    others = ", ".join(repr(n) for i, n in enumerate(layout.names) if i not in taken and n)
     told = {"kind": "a table of points", "unit": stated,
             "points_not_seen": f"{int(np.isnan(x[..., 0]).sum())} of {x[..., 0].size}",
-            **unsure, **_others(layout), **told_left(left)}  # fmt: skip
+            **unsure, **({LEFT_OUT + ", columns": others} if others else {}),
+            **told_left(left)}  # fmt: skip
     topic = "landmarks" if landmarks else "markers"
     source = source_of(path, "text file: integrity not provable")
     return recorded(path.stem, source, {topic: markers}, told)
 
 
-def _points(
-    held: TextRows, layout: PointLayout, values: Floats, rows: tuple[TextRow, ...]
-) -> Floats:
-    """Coordinates (nt, k, d) in the table's unit; of landmarks (1, k, d)."""
-    d = len(next(iter(layout.points.values())))
-    x = values[:, : len(layout.columns)].reshape(len(values), -1, d)
-    x = np.where(np.abs(x) < NONE, x, np.nan)
-    if layout.label is not None:
-        if np.isnan(x).any():
-            raise RecordingError(f"{held.name}: a landmark without coordinates; remove its line")
-        return x.reshape(1, -1, d)
-    return whole_points(held, x, tuple(layout.points), rows)
+def _coordinates(
+    held: TextRows,
+    layout: PointLayout,
+    values: Floats,
+    rows: tuple[TextRow, ...],
+    options: Options,
+) -> tuple[Floats, str, dict[str, str]]:
+    """Coordinates (nt, k, 3) m, of landmarks (1, k, 3), their unit and who said so, and the
+    record's entry about those that are not seen.
 
-
-def _without_unsure(
-    layout: PointLayout, x: Floats, values: Floats, options: Options
-) -> tuple[Floats, dict[str, str]]:
-    """Points, those of too small a likelihood as not seen, and the record's entry about them."""
-    if not layout.sure:
-        if "likelihood" in options:
-            raise UsageError("--map likelihood: the table has none for each point")
-        return x, {}
-    least = above_zero({"likelihood": str(_UNSURE), **options}, "likelihood")
-    count = len(layout.columns)
-    low = values[:, count : count + len(layout.sure)] < least
-    told = f"likelihood below {least:g} is taken as missing ({int(low.sum())} of {low.size})"
-    entry = (
-        {} if "likelihood" in options else {ASSUMED: f"{told}; change it with --map likelihood=0.9"}
-    )
-    return np.where(low[..., None], np.nan, x), entry or {"likelihood": told}
-
-
-def _scale(held: TextRows, layout: PointLayout, options: Options) -> tuple[float, str]:
-    """Metres in the table's unit, and who said so.
-
-    Raises `UsageError` where nobody does, and for pixels without their size.
+    Raises `UsageError` where nobody says the unit, and for pixels without their size.
     """
-    unit = "" if "unit" in options else _one_unit(held, layout) or layout.above.get("units", "")
+    count, d = len(layout.columns), len(next(iter(layout.points.values())))
+    x = values[:, :count].reshape(len(values), -1, d)
+    x = np.where(np.abs(x) < NONE, x, np.nan)
+    if layout.label is None:
+        x = whole_points(held, x, tuple(layout.points), rows)
+    elif np.isnan(x).any():
+        raise RecordingError(f"{held.name}: a landmark without coordinates; remove its line")
+    else:
+        x = x.reshape(1, -1, d)
+    # Points of too small a likelihood are not seen.
+    entry = {}
+    if layout.sure:
+        least = above_zero({"likelihood": str(_UNSURE), **options}, "likelihood")
+        low = values[:, count : count + len(layout.sure)] < least
+        told = f"likelihood below {least:g} is taken as missing ({int(low.sum())} of {low.size})"
+        entry = {ASSUMED: f"{told}; change it with --map likelihood=0.9"}
+        if "likelihood" in options:
+            entry = {"likelihood": told}
+        x = np.where(low[..., None], np.nan, x)
+    elif "likelihood" in options:
+        raise UsageError("--map likelihood: the table has none for each point")
+    # Metres in the table's unit, and who said so.
+    unit = ""
+    if "unit" not in options:
+        units = {layout.units[i] for i in layout.columns}
+        if len(units) > 1:
+            shown = ", ".join(repr(u) for u in sorted(units))
+            raise UsageError(f"{held.name}: coordinates in {shown}; give one, as --map unit=mm")
+        unit = units.pop() or layout.above.get("units", "")
     if "m_per_px" in options and (not unit or unit in PIXELS):
         if "unit" in options:
             raise UsageError(f"{held.name}: --map unit and m_per_px exclude each other; give one")
-        size = length(options, "m_per_px", "0.1mm")
-        return size, f"px of {size:g} m (entered)"
-    if "m_per_px" in options:
+        factor = length(options, "m_per_px", "0.1mm")
+        stated = f"px of {factor:g} m (entered)"
+    elif "m_per_px" in options:
         raise UsageError(f"{held.name}: --map m_per_px: coordinates are in {unit}")
-    if unit in PIXELS:
+    elif unit in PIXELS:
         raise UsageError(f"{held.name}: coordinates in pixels; give the pixel size, as --map "
                          f"m_per_px=0.1mm")  # fmt: skip
-    return metres(options, unit, held.name)
+    else:
+        factor, stated = metres(options, unit, held.name)
+    if d == len(AXES):
+        if "z" in options:
+            raise UsageError(f"{held.name}: --map z: the points already have a z; leave it out")
+        return factor * x, stated, entry
+    if "z" not in options:
+        raise UsageError(f"{held.name}: points have x and y only; give the position of their "
+                         f"plane, as --map z=0mm")  # fmt: skip
+    z = length(options, "z", "0mm", zero=True) + 0 * x[..., :1]  # NaN where it was not seen
+    return np.concatenate([factor * x, z], axis=2), stated, entry
 
 
 def _by_instants(
@@ -444,19 +450,6 @@ def _by_instants(
     return instants - instants[0], tuple(names), found.reshape(len(instants), -1, x.shape[2])
 
 
-def _with_third(held: TextRows, x: Floats, options: Options) -> Floats:
-    """Points with the z that the user says, where they have none: in m, as the factor knows."""
-    if x.shape[2] == len(AXES):
-        if "z" in options:
-            raise UsageError(f"{held.name}: --map z: the points already have a z; leave it out")
-        return x
-    if "z" not in options:
-        raise UsageError(f"{held.name}: points have x and y only; give the position of their "
-                         f"plane, as --map z=0mm")  # fmt: skip
-    z = length(options, "z", "0mm", zero=True) + 0 * x[..., :1]  # NaN where it was not seen
-    return np.concatenate([x, z], axis=2)
-
-
 def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options) -> Floats:
     """Seconds of each row from the first instant."""
     instants = values[:, -1] if layout.instant is not None else np.arange(float(len(values)))
@@ -482,7 +475,15 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
         nth = np.unique(instants, return_inverse=True)[1]
         return np.asarray(nth / above_zero(options, "rate"))
     if layout.time is None:
-        return np.asarray((instants - instants.min()) / _frequency(held, layout, options))
+        # The rate in Hz that the user gives, else that of a line above the names.
+        stated = as_number(layout.above.get("frequency", "")) or 0.0
+        rate = above_zero(options, "rate") if "rate" in options else stated
+        if not 0 < rate < np.inf:
+            raise UsageError(
+                f"{held.name}: no column of time; if its rows are instants, give --map rate=HZ; if "
+                "they are points at one instant, name each in a column called name"
+            )
+        return np.asarray((instants - instants.min()) / rate)
     if "rate" in options:
         return np.arange(len(values)) / above_zero(options, "rate")
     name = layout.names[layout.time or 0]
@@ -496,33 +497,6 @@ def _times(held: TextRows, layout: PointLayout, values: Floats, options: Options
         raise RecordingError(f"{held.name}: line {layout.rows[at].line}: its time is not after "
                              f"the one before; correct it, or give --map rate=HZ")  # fmt: skip
     return np.asarray(t - t.min())
-
-
-def _frequency(held: TextRows, layout: PointLayout, options: Options) -> float:
-    """Hz, as the user says it, else a line above the names."""
-    if "rate" in options:
-        return above_zero(options, "rate")
-    stated = as_number(layout.above.get("frequency", "")) or 0.0
-    if not 0 < stated < np.inf:
-        raise UsageError(
-            f"{held.name}: no column of time; if its rows are instants, give --map rate=HZ; if "
-            "they are points at one instant, name each in a column called name"
-        )
-    return stated
-
-
-def _one_unit(held: TextRows, layout: PointLayout) -> str:
-    units = {layout.units[i] for i in layout.columns}
-    if len(units) > 1:
-        shown = ", ".join(repr(u) for u in sorted(units))
-        raise UsageError(f"{held.name}: coordinates in {shown}; give one, as --map unit=mm")
-    return units.pop()
-
-
-def _others(layout: PointLayout) -> dict[str, str]:
-    taken = {*layout.columns, *layout.sure, layout.instant, layout.label, layout.whose}
-    left = [repr(n) for i, n in enumerate(layout.names) if i not in taken and n]
-    return {LEFT_OUT + ", columns": ", ".join(left)} if left else {}
 
 
 def _recognises(path: Path) -> bool:

@@ -114,8 +114,13 @@ def _beside(table: Table) -> list[Table]:
     if all(found) and len(set(found)) == len(found):
         labels = found
     else:
-        above = _labels_above(table, len(groups))
-        labels = above or [str(i + 1) for i in range(len(groups))]
+        labels = [str(i + 1) for i in range(len(groups))]
+        for cells in reversed(table.above):
+            texts = [t for t in cells if t]
+            numbered = [t for t in texts if holds(t, SPECIMEN) or re.search("[0-9]", t)]
+            if len(texts) == len(groups) == len(set(texts)) == len(numbered):
+                labels = [specimen_label([t]) or t for t in texts]
+                break
     return [_group(table, g, label) for g, label in zip(groups, labels, strict=True)]
 
 
@@ -152,44 +157,27 @@ def _group(table: Table, group: Sequence[int], label: str) -> Table:
     return part.take(range(last))
 
 
-def _labels_above(table: Table, count: int) -> list[str]:
-    """The cells of a line above the names that holds one different specimen for each group."""
-    for cells in reversed(table.above):
-        texts = [t for t in cells if t]
-        named = [t for t in texts if holds(t, SPECIMEN) or re.search("[0-9]", t)]
-        if len(texts) == count == len(set(texts)) == len(named):
-            return [specimen_label([t]) or t for t in texts]
-    return []
-
-
 # --- below each other ----------------------------------------------------------------------------
 
 
 def _by_column(table: Table) -> list[Table]:
     """Parts of a table with a column such as `Specimen` that changes along the rows."""
     named = [c for c in table.columns if holds(c.name, SPECIMEN) and role_of(c) is None]
+    time = _time(table) if named else None
+    clock = [number(c, table.decimal) for c in time.cells] if time is not None else []
     for column in named:
         starts = [0, *(i + 1 for i, (a, b) in enumerate(pairwise(column.cells)) if a != b)]
         values = [column.cells[i] for i in starts]
-        if 1 < len(values) == len(set(values)) and all(values) and _restarts(table, starts):
+        # Time, where there is one, begins anew at every start.
+        turns = [(clock[i - 1], clock[i]) for i in starts[1:]] if clock else []
+        restarts = all(a is not None and b is not None and b <= a for a, b in turns)
+        if 1 < len(values) == len(set(values)) and all(values) and restarts:
             ends = [*starts[1:], len(table.lines)]
             return [
                 replace(table.take(range(a, b)), specimen=v)
                 for a, b, v in zip(starts, ends, values, strict=True)
             ]
     return [table]
-
-
-def _restarts(table: Table, starts: Sequence[int]) -> bool:
-    """Whether time, where there is one, begins anew at every start."""
-    time = _time(table)
-    if time is None:
-        return True
-    values = [number(c, table.decimal) for c in time.cells]
-    return all(
-        a is not None and b is not None and b <= a
-        for a, b in ((values[i - 1], values[i]) for i in starts[1:])
-    )
 
 
 def _joined(tables: Sequence[Table]) -> list[Table]:
@@ -257,9 +245,19 @@ def specimen_of(header: Mapping[str, str], decimal: str) -> dict[str, float]:
     lengths: dict[str, float] = {}
     for key, text in header.items():
         for name, quantity, given, taken in GEOMETRY:
-            value = _value(key, text, quantity, given, taken, decimal)
-            if value is None:
+            parts = _GLUED.fullmatch(text.strip())
+            if not holds(key, given) or holds(key, taken) or parts is None:
                 continue
+            glued = (parts["unit"] or "").strip("()[] ")
+            _, in_key = split_unit(key)
+            if glued and in_key and is_unit(in_key) and glued != in_key:
+                raise RecordingError(f"header: '{key}' is given in {glued}; keep one unit")
+            unit = glued or in_key
+            if unit is None or not is_unit(unit):
+                continue
+            value = _number(key, parts["number"].strip(), decimal) * si_factor(unit, quantity)
+            if value <= 0:
+                raise RecordingError(f"header: '{key}' is {text}, expected a size above 0")
             if name == LENGTH:
                 lengths[f"{LENGTH}/{key}"] = value
             before, by = found.setdefault(name, (value, key))
@@ -290,27 +288,6 @@ def loaded_area(specimen: Mapping[str, float], test: str = "") -> float | None:
         return sides[0] * sides[1] if len(sides) == 2 else None
     sides = [specimen[k] for k in ("width_m", "thickness_m", "length_m") if k in specimen]
     return sides[0] * sides[1] if len(sides) == 2 and "height_m" in specimen else None
-
-
-def _value(
-    key: str, text: str, quantity: str, given: str, taken: str, decimal: str
-) -> float | None:
-    if not holds(key, given) or holds(key, taken):
-        return None
-    parts = _GLUED.fullmatch(text.strip())
-    if parts is None:
-        return None
-    glued = (parts["unit"] or "").strip("()[] ")
-    _, in_key = split_unit(key)
-    if glued and in_key and is_unit(in_key) and glued != in_key:
-        raise RecordingError(f"header: '{key}' is given in {glued}; keep one unit")
-    unit = glued or in_key
-    if unit is None or not is_unit(unit):
-        return None
-    value = _number(key, parts["number"].strip(), decimal) * si_factor(unit, quantity)
-    if value <= 0:
-        raise RecordingError(f"header: '{key}' is {text}, expected a size above 0")
-    return value
 
 
 def _number(key: str, text: str, decimal: str) -> float:

@@ -157,7 +157,15 @@ def split_lines(raw: Sequence[str]) -> Split:
             continue
         split = [(i + 1, _cells(line, separator)) for i, line in enumerate(raw)]
         filled = [(i, cells) for i, cells in split if any(cells)]
-        score, run = _longest_run(filled)
+        # Count of numbers in the longest run of rows, and the index where it starts.
+        score = run = count = start = 0
+        for index, (_, cells) in enumerate(filled):
+            if not is_row(cells):
+                start, count = index + 1, 0
+                continue
+            count += sum(looks_numeric(cell) for cell in cells)
+            if count > score:
+                score, run = count, start
         if score > best.score:
             emptied = [i for i, cells in split if len(cells) > 1 and not any(cells)]
             best = Split(score, separator, filled, emptied, run)
@@ -192,18 +200,6 @@ def is_row(cells: Sequence[str], least: int = 1) -> bool:
 def is_data(cells: Sequence[str]) -> bool:
     """Return a row of a table, not a `key,number` line of a header block."""
     return is_row(cells, least=2)
-
-
-def _longest_run(lines: Sequence[Line]) -> tuple[int, int]:
-    """Count of numbers in the longest run of rows, and the index where it starts."""
-    best, start, score = (0, 0), 0, 0
-    for index, (_, cells) in enumerate(lines):
-        if not is_row(cells):
-            start, score = index + 1, 0
-            continue
-        score += sum(looks_numeric(cell) for cell in cells)
-        best = max(best, (score, start), key=lambda found: found[0])
-    return best
 
 
 def is_unit_row(cells: Sequence[str]) -> bool:
@@ -380,31 +376,24 @@ def header_of(lines: Sequence[Line], raw: Sequence[str]) -> dict[str, str]:
     """Keys and values of header lines; bare text is kept under its line number."""
     header: dict[str, str] = {}
     for line, cells in lines:
-        key, value = _key_value(raw[line - 1], cells)
+        first, *rest = [cell for cell in cells if cell]
+        # `Dimension : Diameter,,50.0,mm`: the colon belongs to the key, a number follows in a cell.
+        if rest and (
+            ":" not in first
+            or first.endswith(":")
+            or (looks_numeric(rest[0]) and not re.search(r"[0-9]", first.partition(":")[2]))
+        ):
+            key, value = first.rstrip(": "), " ".join(rest)
+        else:
+            plain = raw[line - 1].strip().strip('"').rstrip('; ,\t"')
+            key, sign, value = plain.partition(":" if ":" in plain else "=")
+            key, value = (key.strip(' "'), value.strip(' ",;')) if sign else ("", plain)
         if not key:
-            key, value = f"line {line}", value
+            key = f"line {line}"
         elif header.get(key, value) != value:
             key = f"{key} (line {line})"
         header[key] = value
     return header
-
-
-def _key_value(raw: str, cells: Sequence[str]) -> tuple[str, str]:
-    """Key and value of a header line; an empty key when the line is bare text."""
-    first, *rest = [cell for cell in cells if cell]
-    # `Dimension : Diameter,,50.0,mm`: the colon belongs to the key, a number follows in a
-    # cell.
-    if rest and (
-        ":" not in first
-        or first.endswith(":")
-        or (looks_numeric(rest[0]) and not re.search(r"[0-9]", first.partition(":")[2]))
-    ):
-        return first.rstrip(": "), " ".join(rest)
-    plain = raw.strip().strip('"').rstrip('; ,\t"')
-    key, colon, value = plain.partition(":")
-    if not colon:
-        key, colon, value = plain.partition("=")
-    return (key.strip(' "'), value.strip(' ",;')) if colon else ("", plain)
 
 
 # --- text encoding of a file, chosen by evidence that the recording lists ------------------------
@@ -446,7 +435,16 @@ def decode(data: bytes, said: str | None = None) -> Text:
     """
     if len(data) > MAX_BYTES:
         raise RecordingError(f"{len(data)} bytes, the limit for text tables is {MAX_BYTES}")
-    encoding, why = (_named(said), "given by --map") if said else _chosen(data)
+    if said:
+        try:
+            encoding, why = codecs.lookup(said).name, "given by --map"
+        except LookupError:
+            raise UsageError(
+                f"--map encoding={said}: unknown encoding; expected utf-8, utf-16, "
+                f"{', '.join(CANDIDATES)}"
+            ) from None
+    else:
+        encoding, why = _chosen(data)
     try:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
@@ -468,16 +466,6 @@ def whole_file(path: Path) -> bytes:
     """Return the bytes of a text of bounded size; raises `RecordingError` where it cannot be
     read."""
     return read_bytes(path, MAX_BYTES)
-
-
-def _named(said: str) -> str:
-    try:
-        return codecs.lookup(said).name
-    except LookupError:
-        raise UsageError(
-            f"--map encoding={said}: unknown encoding; expected utf-8, utf-16, "
-            f"{', '.join(CANDIDATES)}"
-        ) from None
 
 
 def _chosen(data: bytes) -> tuple[str, str]:

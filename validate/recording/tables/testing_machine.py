@@ -373,11 +373,7 @@ def recording_of(
         metadata={
             "header": dict(table.header),
             "specimen": {**shown, "test": flips.kind.name if flips.kind else "not stated"},
-            ASSUMED: {
-                **_assumed(picks, flips),
-                **({"sizes": "; ".join(one.words for one in made.values())} if made else {}),
-                **_stop(table.header),
-            },
+            ASSUMED: _assumed(table.header, picks, made, flips),
             "provenance": {**origin, **_provenance(table, picks, flips, notes, mapping)},
         },
     )
@@ -397,8 +393,16 @@ def _found(
                 found[role] = Sized(timed_pick(role, table, said.get(role)), "")
         except RecordingError as error:
             wrong.append(error)
+    missing = [e for e in wrong if isinstance(e, MissingColumnError)]
+    if len(wrong) == 1 and (kind or not missing):
+        raise wrong[0]
     if wrong:
-        raise _all(wrong, kind)
+        # One error for all that is missing, each thing to be said once.
+        what = "; ".join(e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong)
+        asks = dict.fromkeys(ask for e in missing for ask in e.asks)
+        if missing and not kind:
+            asks[f"{ASK.removeprefix('give ')}, as neither strain nor stretch shows it"] = None
+        raise RecordingError(what + (f"; give {'; '.join(asks)}" if asks else ""))
     # Raises `UsageError` where one column would be both.
     force = found["force"].pick
     if found["displacement"].pick.column is force.column:
@@ -410,18 +414,6 @@ def _found(
             f"column, as --map '{other}={left[0] if left else 'COLUMN'}:UNIT'"
         )
     return found
-
-
-def _all(wrong: list[RecordingError], kind: Kind | None) -> RecordingError:
-    """One error for all that is missing, each thing to be said once."""
-    missing = [e for e in wrong if isinstance(e, MissingColumnError)]
-    if len(wrong) == 1 and (kind or not missing):
-        return wrong[0]
-    what = [e.what if isinstance(e, MissingColumnError) else str(e) for e in wrong]
-    asks = dict.fromkeys(ask for e in missing for ask in e.asks)
-    if missing and not kind:
-        asks[f"{ASK.removeprefix('give ')}, as neither strain nor stretch shows it"] = None
-    return RecordingError("; ".join(what) + (f"; give {'; '.join(asks)}" if asks else ""))
 
 
 def _column(x: Floats) -> Floats:
@@ -457,27 +449,27 @@ def _flipped(flips: Signs) -> str:
     return ", ".join(flipped) or "none"
 
 
-def _assumed(picks: Mapping[str, Pick], flips: Signs) -> Record:
-    """Kind of test, signs and unit factors, each with what decided."""
+def _assumed(
+    header: Mapping[str, str], picks: Mapping[str, Pick], made: Mapping[str, Sized], flips: Signs
+) -> Record:
+    """Kind of test, signs, unit factors and sizes, each with what decided, and an early end."""
     kind = f"{flips.kind.name}: {flips.kind.why}" if flips.kind else "not stated"
     units = [
         f"'{p.column.label}' in {p.unit} x {p.factor:.6g}{' (given)' if p.unit_is_said else ''}"
         for p in picks.values()
     ]
-    return {
+    assumed = {
         "test": kind,
         "signs": f"flipped: {_flipped(flips)}, so that compression is positive; {flips.why}",
         "units": ", ".join(units),
     }
-
-
-def _stop(header: Mapping[str, str]) -> Record:
-    """Words that tell that the run was ended early; how far it got is in the rows."""
-    told = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
-    said = next((text for text in told if tells_a_stop(text)), None)
-    return (
-        {"run": f"aborted, by the words '{said[:60]}'; rows up to there are read"} if said else {}
-    )
+    if made:
+        assumed["sizes"] = "; ".join(one.words for one in made.values())
+    # Words that tell that the run was ended early; how far it got is in the rows.
+    lines = (v if k.startswith("line ") else f"{k}: {v}" for k, v in header.items())
+    if stop := next((text for text in lines if tells_a_stop(text)), None):
+        assumed["run"] = f"aborted, by the words '{stop[:60]}'; rows up to there are read"
+    return assumed
 
 
 def _is_text(path: Path) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from types import SimpleNamespace
 
-from validate.compare.exhibit import Chart, Exhibit, NumberTable
+from validate.compare.exhibit import Exhibit
 from validate.report.views.view_filling import chart, grouped, table
 from validate.study.choose.study import Choice, error_of, meeting, misses
 from validate.study.filters.ranking import SAME_TIME
@@ -15,13 +15,45 @@ _MM, _US = 1e3, 1e6
 
 def choose_exhibits(choice: Choice) -> tuple[Exhibit, ...]:
     """Return the verdict and its evidence, then the table that it rests on."""
-    return (
-        Exhibit("choice", "The choice", tuple(words(choice)), charts=(_chart(choice),)),
-        Exhibit("numbers", "Properties of the scene", tables=(_facts(choice),)),
-        Exhibit("ladder", "The ladder", tuple(choice.rejected),
-                tables=(_ladder(choice), *((_excluded(choice),) if choice.excluded else ()))),
-        *trade_exhibits(choice.trade),
+    # The requirement and all cells
+    by, want, trade = choice.by, choice.wanted, choice.trade
+    rows = [r for r in trade.rows if error_of(r, by) and r.time_s]
+    left = min(0.5 * min(r.time_s or 1.0 for r in rows), 0.5 / want.rate)
+    low = min(0.5 * min(error_of(r, by) or 1.0 for r in rows), 0.5 * want.error)
+    corner = ((left, want.error), (1 / want.rate, want.error), (1 / want.rate, low))
+    required = [SimpleNamespace(**{"time_s": time, by: error}) for time, error in corner]
+    chosen = {"the choice": [choice.pick]} if choice.pick else {"the nearest": [choice.nearest]}
+    cells = chart(
+        "choice", "Requirement and all cells", TIME, (f"error / {trade.shown_unit}", by),
+        points=grouped(rows, "solver.rung") | chosen,
+        lines={"required: left of and below this line": required}, log="xy",
     )  # fmt: skip
+    columns = {"what": "name", "value": "value", "asks for": "means"}
+    facts = table("numbers", "Properties of the scene", choice.facts, columns)
+    title = "Fastest cell of every candidate method that meets both, else its nearest"
+    columns = {
+        "rung": "rung", "verdict": "verdict", "cells": "run", "scored": "scored",
+        f"error / {trade.shown_unit}": f"best.{by}", "time / us": "best.time_s",
+        "rate / Hz": "best.rate_hz", "evidence": "evidence",
+    }  # fmt: skip
+    ladder = [table("ladder", title, choice.ladder, columns)]
+    if choice.excluded:
+        note = (
+            f"A bound is the median step of the pilot run divided by {SAME_TIME:g}, because "
+            "step times are noisy."
+        )
+        columns = {
+            "rung": "rung", "candidate": "candidate", "a step takes at least / us": "bound",
+            "pick / us": "pick", "why": "why",
+        }  # fmt: skip
+        title = "Candidates left out by a bound"
+        ladder.append(table("excluded", title, choice.excluded, columns, note))
+    return (
+        Exhibit("choice", "The choice", tuple(words(choice)), charts=(cells,)),
+        Exhibit("numbers", "Properties of the scene", tables=(facts,)),
+        Exhibit("ladder", "The ladder", tuple(choice.rejected), tables=tuple(ladder)),
+        *trade_exhibits(trade),
+    )
 
 
 def words(choice: Choice) -> Iterator[str]:
@@ -57,7 +89,12 @@ def words(choice: Choice) -> Iterator[str]:
             yield f"Within {SAME_TIME:g} times its time and less wrong: {described(best, choice)}."
     else:
         yield f"Nothing meets both {asked}."
-        yield f"Nearest: {described(choice.nearest, choice)}; {_missed(choice)}."
+        wrong, late = misses(choice.nearest, want, choice.by, choice.trade.trial.dynamic)
+        missed = [
+            *([f"its error is {wrong:.3g} times the required one"] if wrong > 1 else []),
+            *([f"it is {late:.3g} times too slow"] if late > 1 else []),
+        ] or ["it meets both at its step, but not with a new state at every tick"]
+        yield f"Nearest: {described(choice.nearest, choice)}; {' and '.join(missed)}."
         yield from _one_sided(choice)
     yield from pays(choice.trade)
     floor = choice.trade.floor
@@ -88,15 +125,6 @@ def _judged(choice: Choice) -> list[TradeRow]:
     return [r for r in rows if not r.solver.lacks]
 
 
-def _missed(choice: Choice) -> str:
-    wrong, late = misses(choice.nearest, choice.wanted, choice.by, choice.trade.trial.dynamic)
-    if max(wrong, late) <= 1:
-        return "it meets both at its step, but not with a new state at every tick"
-    error = f"its error is {wrong:.3g} times the required one"
-    time = f"it is {late:.3g} times too slow"
-    return " and ".join([error] * (wrong > 1) + [time] * (late > 1))
-
-
 def _one_sided(choice: Choice) -> Iterator[str]:
     dynamic = choice.trade.trial.dynamic
     miss = [(misses(r, choice.wanted, choice.by, dynamic), r) for r in _judged(choice)]
@@ -112,45 +140,3 @@ def _one_sided(choice: Choice) -> Iterator[str]:
         yield f"The least error at that rate: {described(best, choice)}."
     else:
         yield "No cell meets the rate."
-
-
-def _facts(choice: Choice) -> NumberTable:
-    columns = {"what": "name", "value": "value", "asks for": "means"}
-    return table("numbers", "Properties of the scene", choice.facts, columns)
-
-
-def _ladder(choice: Choice) -> NumberTable:
-    title = "Fastest cell of every candidate method that meets both, else its nearest"
-    columns = {
-        "rung": "rung", "verdict": "verdict", "cells": "run", "scored": "scored",
-        f"error / {choice.trade.shown_unit}": f"best.{choice.by}", "time / us": "best.time_s",
-        "rate / Hz": "best.rate_hz", "evidence": "evidence",
-    }  # fmt: skip
-    return table("ladder", title, choice.ladder, columns)
-
-
-def _excluded(choice: Choice) -> NumberTable:
-    note = (
-        f"A bound is the median step of the pilot run divided by {SAME_TIME:g}, because "
-        "step times are noisy."
-    )
-    columns = {
-        "rung": "rung", "candidate": "candidate", "a step takes at least / us": "bound",
-        "pick / us": "pick", "why": "why",
-    }  # fmt: skip
-    return table("excluded", "Candidates left out by a bound", choice.excluded, columns, note)
-
-
-def _chart(choice: Choice) -> Chart:
-    by, want = choice.by, choice.wanted
-    rows = [r for r in choice.trade.rows if error_of(r, by) and r.time_s]
-    left = min(0.5 * min(r.time_s or 1.0 for r in rows), 0.5 / want.rate)
-    low = min(0.5 * min(error_of(r, by) or 1.0 for r in rows), 0.5 * want.error)
-    corner = ((left, want.error), (1 / want.rate, want.error), (1 / want.rate, low))
-    required = [SimpleNamespace(**{"time_s": time, by: error}) for time, error in corner]
-    chosen = {"the choice": [choice.pick]} if choice.pick else {"the nearest": [choice.nearest]}
-    return chart(
-        "choice", "Requirement and all cells", TIME, (f"error / {choice.trade.shown_unit}", by),
-        points=grouped(rows, "solver.rung") | chosen,
-        lines={"required: left of and below this line": required}, log="xy",
-    )  # fmt: skip

@@ -164,12 +164,40 @@ def facts(trade: Trade, error: float, effects: ShownEffects | None = None) -> tu
         if n
         else "no pressure is computed"
     )
+    if scene.noise is None:
+        noise = Fact("noise", "no recording", "no statement")
+    else:
+        sd, where = scene.noise
+        if trade.unit != "m":
+            shows = f"no statement about an error in {trade.shown_unit}"
+        elif sd < error:
+            shows = "a recording can detect such an error"
+        else:
+            shows = "a recording cannot detect such an error at a single point"
+        noise = Fact("noise", f"{1e3 * sd:.3g} mm, {where}", shows)
+    density = body.material.rho or _WATER
+    solid = replace(body, cavities=(), material=replace(body.material, rho=density))
+    modes = Modes.of(build(solid), 1)
+    f, ratio = modes.omega[0] / (2 * np.pi), modes.damping[0] / (2 * modes.omega[0])
+    at = f"{f:.3g} Hz"
+    assumed = "" if body.material.rho else f", at an assumed {_WATER:g} kg/m3"
+    if scene.rise_s == 0:
+        rises = f"switched on at once; {at}, damping ratio {ratio:.2g}{assumed}"
+        needs = (
+            "the load has no rise time: inertia and damping are needed until the motion has decayed"
+        )
+    else:
+        periods = scene.rise_s * f
+        rises = f"rises in {scene.rise_s:.3g} s; {at}{assumed}: {periods:.3g} periods"
+        needs = "not static: inertia matters"
+        if periods > _SLOW:
+            needs = "nearly static: a static method may be enough"
     return (
-        _loading(scene, body),
+        Fact("loading rate against lowest frequency", rises, needs),
         _strain(scene, body, trade),
         Fact("Poisson ratio", f"{nu:g}", locks if nu >= LOCKING_FROM else "no locking to expect"),
         Fact("fluid", f"{n} cavity" if n == 1 else f"{n} cavities" if n else "none", means),
-        _noise(trade, error),
+        noise,
         Fact(
             "reference",
             f"{trade.trial.reference[0]} mesh {trade.trial.reference[1]}, its error "
@@ -180,31 +208,20 @@ def facts(trade: Trade, error: float, effects: ShownEffects | None = None) -> tu
     )
 
 
-def _loading(scene: Trial, body: Scene) -> Fact:
-    density = body.material.rho or _WATER
-    solid = replace(body, cavities=(), material=replace(body.material, rho=density))
-    modes = Modes.of(build(solid), 1)
-    f, ratio = modes.omega[0] / (2 * np.pi), modes.damping[0] / (2 * modes.omega[0])
-    assumed = "" if body.material.rho else f", at an assumed {_WATER:g} kg/m3"
-    name = "loading rate against lowest frequency"
-    if scene.rise_s == 0:
-        return Fact(
-            name, f"switched on at once; {f:.3g} Hz, damping ratio {ratio:.2g}{assumed}",
-            "the load has no rise time: inertia and damping are needed until the motion has "
-            "decayed",
-        )  # fmt: skip
-    periods = scene.rise_s * f
-    slow = (
-        "nearly static: a static method may be enough"
-        if periods > _SLOW
-        else ("not static: inertia matters")
-    )
-    return Fact(name, f"rises in {scene.rise_s:.3g} s; {f:.3g} Hz{assumed}: {periods:.3g} periods",
-                slow)  # fmt: skip
-
-
 def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
-    u = _pilot(scene, body)
+    # Displacements (n, d) m under the largest inputs: statics, or where a probe touches the motion
+    # up to there.
+    if not body.tools:
+        static = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
+        u = static.field(static.step(static.rest(), scene.largest_inputs))
+    else:
+        dt = scene.steps[-1]
+        path = scene.inputs(scene.times(dt))
+        stepper = scene.best(dt).prepare(build(body))
+        state = stepper.rest()
+        for x in path[: int(np.abs(path).sum(axis=1).argmax()) + 1]:
+            state = stepper.step(state, x)
+        u = stepper.field(state)
     strain = principal_strains(body.mesh, u)
     peak, most = float(strain.max()), float(np.quantile(strain, 0.95))
     cost = f"large strain was not solved ({trade.law_words})"
@@ -217,38 +234,9 @@ def _strain(scene: Trial, body: Scene, trade: Trade) -> Fact:
                 f"{means}; measured, {cost}")  # fmt: skip
 
 
-def _pilot(scene: Trial, body: Scene) -> Floats:
-    """Displacements (n, d) m under the largest inputs: statics, or where a probe touches the motion
-    up to there."""
-    if not body.tools:
-        stepper = (ExactPressure() if body.cavities else QuasiStatic()).prepare(build(body))
-        return stepper.field(stepper.step(stepper.rest(), scene.largest_inputs))
-    dt = scene.steps[-1]
-    path = scene.inputs(scene.times(dt))
-    stepper = scene.best(dt).prepare(build(body))
-    state = stepper.rest()
-    for x in path[: int(np.abs(path).sum(axis=1).argmax()) + 1]:
-        state = stepper.step(state, x)
-    return stepper.field(state)
-
-
 def principal_strains(mesh: Mesh, u: Floats) -> Floats:
     """Largest |principal small strain| of every simplex (e,), from u (n, d) m at its corners."""
     if mesh.bricks:
         mesh = Mesh(mesh.nodes, mesh.simplices, "tri3" if mesh.dimension == 2 else "tet4")
     H = np.einsum("eai,eaj->eij", u[mesh.corners], shape_gradients(mesh))
     return np.asarray(np.abs(np.linalg.eigvalsh((H + np.swapaxes(H, 1, 2)) / 2)).max(axis=1))
-
-
-def _noise(trade: Trade, error: float) -> Fact:
-    scene = trade.trial
-    if scene.noise is None:
-        return Fact("noise", "no recording", "no statement")
-    sd, where = scene.noise
-    if trade.unit != "m":
-        means = f"no statement about an error in {trade.shown_unit}"
-        return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)
-    means = "a recording can detect such an error" if sd < error else (
-        "a recording cannot detect such an error at a single point"
-    )  # fmt: skip
-    return Fact("noise", f"{1e3 * sd:.3g} mm, {where}", means)

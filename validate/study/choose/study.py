@@ -111,7 +111,25 @@ class Climb:
             return None
         excluded: tuple[Excluded, ...] = ()
         if fastest is not None:
-            cells, excluded = self._within(cells, rung, fastest)
+            # A bound by a short pilot run on its coarsest mesh excludes a candidate.
+            coarsest: dict[tuple[str, str], TradeCell] = {}
+            for c in cells:
+                known = coarsest.setdefault((c.solver, c.element), c)
+                if c.level < known.level:
+                    coarsest[c.solver, c.element] = c
+            pilots = {
+                name: keyed(self._job, replace(c, budget=_PILOT, key=""))
+                for name, c in coarsest.items()
+            }
+            self._finish(tuple(pilots.values()), rung)
+            slow = {}
+            for name, pilot in pilots.items():
+                bound = time_bound(self._done.records[pilot.key].value)
+                if bound is not None and bound > fastest:
+                    label = ", ".join(name)
+                    slow[name] = Excluded(rung, label, pilot.label, bound, fastest)
+            cells = [c for c in cells if (c.solver, c.element) not in slow]
+            excluded = tuple(slow.values())
         self._finish((*(self._ran if not self._done.records else ()), *cells), rung)
         self._ran = (*self._ran, *cells)
         trade = traded(
@@ -119,35 +137,14 @@ class Climb:
         )
         return Reached(trade, excluded)
 
-    def _within(
-        self, cells: Sequence[TradeCell], rung: Rung, fastest: float
-    ) -> tuple[list[TradeCell], tuple[Excluded, ...]]:
-        """Cells of the candidates that no bound excludes, and the excluded ones."""
-        coarsest: dict[tuple[str, str], TradeCell] = {}
-        for c in cells:
-            known = coarsest.setdefault((c.solver, c.element), c)
-            if c.level < known.level:
-                coarsest[c.solver, c.element] = c
-        pilots = {
-            name: keyed(self._job, replace(c, budget=_PILOT, key=""))
-            for name, c in coarsest.items()
-        }
-        self._finish(tuple(pilots.values()), rung)
-        excluded = {}
-        for name, pilot in pilots.items():
-            bound = time_bound(self._done.records[pilot.key].value)
-            if bound is not None and bound > fastest:
-                solver, element = name
-                excluded[name] = Excluded(
-                    rung, f"{solver}, {element}", pilot.label, bound, fastest
-                )  # fmt: skip
-        kept = [c for c in cells if (c.solver, c.element) not in excluded]
-        return kept, tuple(excluded.values())
-
     def _finish(self, cells: tuple[TradeCell, ...], rung: Rung) -> None:
         if cells:
-            report = _above(rung, self._report)
-            ran = finish(plan_of(self._job, cells), self._folder, self._where, report)
+            report = self._report
+            # Progress names the rung.
+            of_rung: Report | None = report and (
+                lambda done, total, text: report(done, total, f"rung '{rung}': {text}")
+            )
+            ran = finish(plan_of(self._job, cells), self._folder, self._where, of_rung)
             self._done = self._done.and_also(ran)
 
 
@@ -168,13 +165,6 @@ def require_judged(trial: Trial, unit: ErrorUnit) -> None:
         raise UsageError(
             f"--error in {unit}: this scene has no quantity in that unit; it has {names}"
         )
-
-
-def _above(rung: Rung, report: Report | None) -> Report | None:
-    """Progress that names the rung."""
-    if report is None:
-        return None
-    return lambda done, total, text: report(done, total, f"rung '{rung}': {text}")
 
 
 # --- choice of the cheapest method that meets an error and a rate, by pilot runs -----------------
@@ -378,20 +368,16 @@ def _picked(
         tried = None if dt is None else again(trade, row, dt)
         if tried is None or max(misses(tried, want, by, dynamic)) <= 1:
             return row, tried
-        rejected.append(_refusal(trade, tried, by))
+        error, time = error_of(tried, by), tried.time_s
+        every = f"{tried.label}: with a state every {1e3 * tried.dt:.3g} ms"
+        if error is None or time is None:
+            rejected.append(f"{every}: {tried.failed}")
+        else:
+            takes = f"a step takes {1e6 * time:.3g} us"
+            rejected.append(f"{every} its error is {trade.shown(error)} and {takes}")
     if len(faster) > _TRIES:
         rejected.append(f"{rung}: {len(faster) - _TRIES} slower cells were not run again")
     return None
-
-
-def _refusal(trade: Trade, row: TradeRow, by: str) -> str:
-    error, time = error_of(row, by), row.time_s
-    if error is None or time is None:
-        return f"{row.label}: with a state every {1e3 * row.dt:.3g} ms: {row.failed}"
-    return (
-        f"{row.label}: with a state every {1e3 * row.dt:.3g} ms its error is "
-        f"{trade.shown(error)} and a step takes {1e6 * time:.3g} us"
-    )
 
 
 def left_out(declared_law: bool, reason: str) -> str:
@@ -408,10 +394,17 @@ def _climbed(
     mine = [r for r in rows if r.solver.rung == rung]
     scored = [r for r in mine if error_of(r, by) is not None]
     if not scored:
-        left = by == "error" and any(
-            s.rung == rung and s.law != "linear" for s in trade.trial.solvers
-        )
-        why = unsolved if left else _why_not(mine, dynamic)
+        if by == "error" and any(s.rung == rung and s.law != "linear" for s in trade.trial.solvers):
+            why = unsolved
+        elif mine:
+            why = f"all {len(mine)} cells failed, the first: {mine[0].failed}"
+        elif dynamic:
+            why = "not for this scene: it needs a plate as drive, a cavity or a touching probe"
+        else:
+            why = (
+                "not for this scene: it declares no density, or has fluid in cavities, which "
+                "linear schemes with inertia do not support"
+            )
         return Climbed(rung, len(mine), 0, None, "nothing ran", why)
     if all(r.solver.lacks for r in scored):
         best = min(scored, key=lambda r: max(misses(r, want, by, dynamic)))
@@ -450,14 +443,3 @@ def evidence(trade: Trade, row: TradeRow, by: str) -> str:
         mesh, solver = trade.shown(row.mesh_error), trade.shown(row.solver_error)
         words += f" (mesh {mesh}, solver {solver})"
     return words
-
-
-def _why_not(mine: Sequence[TradeRow], dynamic: bool) -> str:
-    if mine:
-        return f"all {len(mine)} cells failed, the first: {mine[0].failed}"
-    if dynamic:
-        return "not for this scene: it needs a plate as drive, a cavity or a touching probe"
-    return (
-        "not for this scene: it declares no density, or has fluid in cavities, which linear "
-        "schemes with inertia do not support"
-    )

@@ -33,7 +33,6 @@ from validate.pipeline.run.method_run import MethodRun
 from validate.pipeline.run.pipeline import set_out
 from validate.pipeline.run.runs import ExperimentRuns
 from validate.register.observation import AnyDraw, Draw, Drawable, Exact, Observation
-from validate.register.registration import Registered
 from validate.study.coverage.plan import (
     FILTER_DRAWS,
     WRONG_DRAWS,
@@ -220,21 +219,18 @@ def run_terms(bench: CoverageBench, cell: TermsCell) -> AllStated:
 
 def _stated(residual: Residual, terms: Terms) -> Stated:
     numerical, names = terms.numerical, numbered([s.name for s in terms.inputs])
+    reached = None
+    if terms.accept.statistic == "every" and residual.count != 1:
+        found = errors_of(residual)
+        reached = float(found.reach(np.zeros(len(found.E))).max() / 2)
     return Stated(
         terms.judge(residual).name, residual.unit, residual.count, terms.accept.required,
-        terms.accept.statistic, _reached(residual, terms.accept.statistic),
+        terms.accept.statistic, reached,
         {k: u if isfinite(u) else None for k, u in numerical.parts.items()},
         numerical.words, numerical.deciding,
         dict(zip(names, (_moved(s, terms.accept.statistic) for s in terms.inputs), strict=True)),
         terms.fitted,
     )  # fmt: skip
-
-
-def _reached(residual: Residual, statistic: Statistic) -> float | None:
-    if statistic != "every" or residual.count == 1:
-        return None
-    found = errors_of(residual)
-    return float(found.reach(np.zeros(len(found.E))).max() / 2)
 
 
 def _moved(input_: Sensitivity, statistic: Statistic) -> tuple[float, ...]:
@@ -324,7 +320,17 @@ class DrawBench:
 
     def residuals(self, reading: ExactReading, draws: Sequence[AnyDraw]) -> dict[str, Residual]:
         """Those of the judged method against a drawn recording, by the name of their check."""
-        seen = self._drawn(reading, draws)
+        left = iter(reading.left)
+        seen = tuple(
+            replace(
+                registered,
+                observations=tuple(
+                    o if o.role == "drives" else drawable(o).anew(next(left), draw)
+                    for o in registered.observations
+                ),
+            )
+            for registered, draw in zip(self.mine.registered, draws, strict=True)
+        )
         runs, method = self.mine.runs, self.runs.settings[self.mine.method]
         if method.markers:
             runs = run_on(
@@ -337,19 +343,6 @@ class DrawBench:
             for s in self.given.stated for r in found.values()
             if name_of(r, s.statistic) == s.name
         }  # fmt: skip
-
-    def _drawn(self, reading: ExactReading, draws: Sequence[AnyDraw]) -> tuple[Registered, ...]:
-        left = iter(reading.left)
-        return tuple(
-            replace(
-                seen,
-                observations=tuple(
-                    o if o.role == "drives" else drawable(o).anew(next(left), draw)
-                    for o in seen.observations
-                ),
-            )
-            for seen, draw in zip(self.mine.registered, draws, strict=True)
-        )
 
     def exact(self) -> list[AnyDraw]:
         return [Exact()] * len(self.mine.registered)
@@ -375,12 +368,48 @@ def run_draws(bench: DrawBench, cell: DrawCell) -> Draws:
         checks = [_judged_draw(bench, label, k) for k in kept]
         worlds[label] = {s.name: _over([c[s.name] for c in checks]) for s in given.stated}
         overall[label] = tuple(bool(judge_all(list(c.values())).differs) for c in checks)
-    first = cell.first == 0
-    return Draws(
-        worlds, overall, _measured(bench, numbers) if given.steps else _of_all(worlds[PERFECT]),
-        _at_limit(bench, numbers),
-        _alone(bench) if first else {}, _off(bench) if first else {},
-    )  # fmt: skip
+    # E by the measurement alone; where no input is uncertain, it is all that is drawn.
+    if given.steps:
+        errors: dict[str, list[float]] = {s.name: [] for s in given.stated}
+        statistics = {s.name: s.statistic for s in given.stated}
+        for k in numbers:
+            for name, residual in bench.residuals(given.base, bench.noise(k)).items():
+                drawn = errors_of(residual, statistics[name])
+                errors[name].append(float(drawn.E[drawn.worst(np.zeros(len(drawn.E)))]))
+        measured = {name: tuple(values) for name, values in errors.items()}
+    else:
+        perfect = worlds[PERFECT].items()
+        measured = {name: tuple(e for e in one.E if e is not None) for name, one in perfect}
+    alone: dict[str, dict[str, tuple[float, ...]]] = {}
+    if cell.first == 0:
+        base = bench.residuals(given.base, bench.exact())
+        for name, pair in given.steps.items():
+            sides = [bench.residuals(side, bench.exact()) for side in pair]
+            alone[name] = {
+                k: tuple(rms(side[k].values - r.values) for side in sides if k in side)
+                for k, r in base.items()
+            }
+    # The largest rms difference between linear and full responses, by check.
+    off: dict[str, float] = {}
+    for draw, reading in given.checks.items() if cell.first == 0 else ():
+        full = bench.residuals(reading, bench.exact())
+        line = bench.residuals(given.linear(draw), bench.exact())
+        for name in full.keys() & line.keys():
+            apart = rms(full[name].values - line[name].values)
+            off[name] = max(apart, off.get(name, 0.0))
+    # Acceptances of a model whose error is the limit itself, where a wrong answer is likeliest: of
+    # every point, along the first component.
+    required = [s for s in given.stated if s.limit is not None and not s.fitted]
+    limits: dict[str, list[str]] = {s.name: [] for s in required}
+    for k in numbers if required else ():
+        found = bench.residuals(given.truth(k), bench.noise(k))
+        for s in (s for s in required if s.name in found):
+            shift = np.zeros_like(found[s.name].values)
+            shift[:, 0] = s.limit
+            wrong = replace(found[s.name], values=found[s.name].values + shift, scale=None)
+            limits[s.name].append(s.terms.judge(wrong).acceptance)
+    at_limit = {name: tuple(answers) for name, answers in limits.items()}
+    return Draws(worlds, overall, measured, at_limit, alone, off)
 
 
 def _judged_draw(bench: DrawBench, label: str, draw: int) -> dict[str, Check]:
@@ -392,21 +421,6 @@ def _judged_draw(bench: DrawBench, label: str, draw: int) -> dict[str, Check]:
         s.name: s.terms.judge(found[s.name]) if s.name in found else _nothing(s)
         for s in given.stated
     }
-
-
-def _at_limit(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[str, ...]]:
-    """Acceptances of a model whose error is the limit itself, where a wrong answer is likeliest:
-    of every point, along the first component."""
-    required = [s for s in bench.given.stated if s.limit is not None and not s.fitted]
-    found: dict[str, list[str]] = {s.name: [] for s in required}
-    for k in numbers if required else ():
-        drawn = bench.residuals(bench.given.truth(k), bench.noise(k))
-        for s in (s for s in required if s.name in drawn):
-            off = np.zeros_like(drawn[s.name].values)
-            off[:, 0] = s.limit
-            wrong = replace(drawn[s.name], values=drawn[s.name].values + off, scale=None)
-            found[s.name].append(s.terms.judge(wrong).acceptance)
-    return {name: tuple(answers) for name, answers in found.items()}
 
 
 def _nothing(s: Stated) -> Check:
@@ -422,43 +436,3 @@ def _over(checks: Sequence[Check]) -> Judged:
         tuple(c.validation for c in checks),
         tuple(c.acceptance for c in checks),
     )
-
-
-def _measured(bench: DrawBench, numbers: Sequence[int]) -> dict[str, tuple[float, ...]]:
-    """E by the measurement alone: the inputs are as they are judged."""
-    found: dict[str, list[float]] = {s.name: [] for s in bench.given.stated}
-    statistics = {s.name: s.statistic for s in bench.given.stated}
-    for k in numbers:
-        for name, residual in bench.residuals(bench.given.base, bench.noise(k)).items():
-            errors = errors_of(residual, statistics[name])
-            found[name].append(float(errors.E[errors.worst(np.zeros(len(errors.E)))]))
-    return {name: tuple(errors) for name, errors in found.items()}
-
-
-def _of_all(judged: Mapping[str, Judged]) -> dict[str, tuple[float, ...]]:
-    """E where no input is uncertain: the measurement is all that is drawn."""
-    return {name: tuple(e for e in one.E if e is not None) for name, one in judged.items()}
-
-
-def _alone(bench: DrawBench) -> dict[str, dict[str, tuple[float, ...]]]:
-    base = bench.residuals(bench.given.base, bench.exact())
-    found: dict[str, dict[str, tuple[float, ...]]] = {}
-    for name, pair in bench.given.steps.items():
-        sides = [bench.residuals(side, bench.exact()) for side in pair]
-        found[name] = {
-            k: tuple(rms(side[k].values - r.values) for side in sides if k in side)
-            for k, r in base.items()
-        }
-    return found
-
-
-def _off(bench: DrawBench) -> dict[str, float]:
-    """The largest rms difference between linear and full responses, by check."""
-    worst: dict[str, float] = {}
-    for draw, reading in bench.given.checks.items():
-        full = bench.residuals(reading, bench.exact())
-        line = bench.residuals(bench.given.linear(draw), bench.exact())
-        for name in full.keys() & line.keys():
-            off = rms(full[name].values - line[name].values)
-            worst[name] = max(off, worst.get(name, 0.0))
-    return worst

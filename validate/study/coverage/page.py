@@ -27,18 +27,6 @@ HEAD = ("differs / %", "95 % interval / %")
 
 def coverage_exhibits(study: Coverage) -> tuple[Exhibit, ...]:
     """Does it hold, which term is at fault, and what would be noticed."""
-    return (_shares(study), _terms(study), *((_power(study),) if study.power else ()))
-
-
-def percent(share: Share) -> str:
-    return f"{100 * share.value:.1f}"
-
-
-def interval(share: Share) -> str:
-    return f"{100 * share.low:.1f} to {100 * share.high:.1f}"
-
-
-def _shares(study: Coverage) -> Exhibit:
     rows: list[tuple[Entry | TableCell, ...]] = [
         (q.method, q.stated.name, TableCell(100 * q.share.value, text=percent(q.share)),
          interval(q.share), *map(_cell, (q.undecided, q.rejected, q.false_good, q.false_bad)),
@@ -64,7 +52,38 @@ def _shares(study: Coverage) -> Exhibit:
                         "get either verdict. All checks together have no rms and no u_val, "
                         "because they have no common unit.",
                         below="which term")  # fmt: skip
-    return Exhibit("coverage", "Verdicts on a perfect model", tuple(_told(study)), (shares,))
+    pairs = [(q, t) for q in study.quantities for t in q.terms]
+    unit = "0.stated.unit"
+    columns: Mapping[str, Shown] = {
+        "method": "0.method", "check": "0.stated.name", "term": "1.name",
+        "claimed": sized("1.part", unit), "observed": sized("1.shown", unit),
+        "observed over claimed / 1": "1.ratio", "rms of E": sized("1.spread", unit),
+        "error of the line": sized(
+            lambda pair: pair[0].off if pair[1].name.startswith("u_input") else None, unit
+        ),
+    }  # fmt: skip
+    words = (
+        "Claimed: the term's part of u_val. Observed: half of the |E| that 4.6 % of the draws "
+        "exceed when only this term is drawn. For a normal law this is the standard "
+        "deviation; for a uniform range it is 0.83 of it. Model and truth have the same mesh, "
+        "so u_num is never observed.",
+    )
+    terms = table("terms", "Terms of u_val against the draws", pairs, columns,
+                  "No ratio: nothing is claimed. No line: solved in full, or not an input.",
+                  folded=len(pairs) > 20)  # fmt: skip
+    return (
+        Exhibit("coverage", "Verdicts on a perfect model", tuple(_told(study)), (shares,)),
+        Exhibit("terms", "Terms that are too wide or too narrow", words, (terms,)),
+        *((_power(study),) if study.power else ()),
+    )
+
+
+def percent(share: Share) -> str:
+    return f"{100 * share.value:.1f}"
+
+
+def interval(share: Share) -> str:
+    return f"{100 * share.low:.1f} to {100 * share.high:.1f}"
 
 
 def _cell(share: Share | None) -> TableCell:
@@ -97,29 +116,6 @@ def _told(study: Coverage) -> Iterator[str]:
     yield from study.notes
     if study.still:
         yield f"Without effect on any check: {', '.join(study.still)}."
-
-
-def _terms(study: Coverage) -> Exhibit:
-    pairs = [(q, t) for q in study.quantities for t in q.terms]
-    unit = "0.stated.unit"
-    columns: Mapping[str, Shown] = {
-        "method": "0.method", "check": "0.stated.name", "term": "1.name",
-        "claimed": sized("1.part", unit), "observed": sized("1.shown", unit),
-        "observed over claimed / 1": "1.ratio", "rms of E": sized("1.spread", unit),
-        "error of the line": sized(
-            lambda pair: pair[0].off if pair[1].name.startswith("u_input") else None, unit
-        ),
-    }  # fmt: skip
-    words = (
-        "Claimed: the term's part of u_val. Observed: half of the |E| that 4.6 % of the draws "
-        "exceed when only this term is drawn. For a normal law this is the standard "
-        "deviation; for a uniform range it is 0.83 of it. Model and truth have the same mesh, "
-        "so u_num is never observed.",
-    )
-    terms = table("terms", "Terms of u_val against the draws", pairs, columns,
-                  "No ratio: nothing is claimed. No line: solved in full, or not an input.",
-                  folded=len(pairs) > 20)  # fmt: skip
-    return Exhibit("terms", "Terms that are too wide or too narrow", words, (terms,))
 
 
 # --- power ----------------------------------------------------------------------------------------

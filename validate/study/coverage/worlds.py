@@ -92,7 +92,10 @@ def read_worlds(study: Study, method: str, z: Floats) -> Worlds:
     )
     checks = CHECKS if each * CHECKS <= BUDGET_S else FEW_CHECKS
     count = study.draws if whole else checks if study.inputs else 0
-    solved = _drawn(truth, z[:count], each)
+    rows = z[:count].tolist()
+    worlds = [World(tuple(zip(study.inputs, row, strict=True))) for row in rows]
+    with_inputs = truth.in_worlds(tuple(worlds), each)
+    solved = [with_inputs[w] for w in worlds]
     paths = tuple(p.path for p in wrong_paths(study.bench.runs.parameters))
     wrong, mistaken, lines = _mistaken(truth, paths, each)
     known = {w.label: r.value for w, r in mistaken.items() if r.value is not None}
@@ -165,13 +168,6 @@ def _sides(
         f"{truth.method}: {w.label} by the surrogate's difference: {why}" for w, why in bad.items()
     )
     return each, tuple(told)
-
-
-def _drawn(truth: _Truth, z: Floats, each: float) -> list[Record[ExactReading]]:
-    """With all inputs drawn, `each` s a solution."""
-    worlds = [World(tuple(zip(truth.study.inputs, row, strict=True))) for row in z.tolist()]
-    found = truth.in_worlds(tuple(worlds), each)
-    return [found[w] for w in worlds]
 
 
 def _mistaken(

@@ -18,7 +18,7 @@ from validate.estimate.filters import FilterStepper
 from validate.estimate.measurements import Measurements
 from validate.fem.assembly.locate import Rows, probe_rows
 from validate.pipeline.run.case_solution import KeptFields
-from validate.solve.types import Run, Stepper, StepTimes
+from validate.solve.types import Run, StepTimes
 from validate.study.filters.plan import EACH, Bench, FilterCell, Ready
 from validate.study.filters.score import NIS, FilterScores, error_scores, withheld_scores
 from validate.study.filters.withheld_errors import (
@@ -91,11 +91,19 @@ def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
         start = perf_counter()
         stepper = cast(FilterStepper, ready.stepper())
         setup = perf_counter() - start
-        if other_times(first.registered) is None:
-            together = _all_seeds(bench, cell, stepper, ready, folds[0])
-            if together is not None:
-                p50, p99 = _step_times(stepper, ready.registered.inputs)
-                return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
+        alike = other_times(first.registered) is None
+        together = _all_seeds(bench, cell, stepper, ready, folds[0]) if alike else None
+        if together is not None:
+            # Of the first steps, run as they are alone; the very first only warms up.
+            state, seconds = stepper.rest(), list[float]()
+            for row in ready.registered.inputs[: _TIMED + 1]:
+                start = perf_counter()
+                state = stepper.step(state, row)
+                seconds.append(perf_counter() - start)
+                if sum(seconds) > _TIMED_S and len(seconds) > 5:
+                    break
+            p50, p99 = np.quantile(seconds[1:] or seconds, [0.5, 0.99]).tolist()
+            return replace(together, step_s=p50, step_p99_s=p99, setup_s=setup)
     scored, timing, steps = list[Scored](), Timing(), 0
     segments: Segments | None = None
     for seed in cell.seeds:
@@ -118,7 +126,7 @@ def run_cell(bench: Bench, cell: FilterCell) -> FilterScores:
 
 
 def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
-    """Return the runs of a cell.
+    """Return the runs of a cell. Raises `UsageError` for held-out names that do not move.
 
     Markers given to no filter score every method. Where there are none, or with `--hold-out each`,
     every marker is held out in turn of a method that is given two and more. One that is given a
@@ -127,7 +135,19 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
     moving = ready.tracks.names if ready.tracks else ()
     given = ready.method.markers
     if cell.hold_out and cell.hold_out != EACH:
-        return (Fold(_left(given, cell.hold_out, moving), cell.hold_out),)
+        absent = [n for n in cell.hold_out if n not in moving]
+        if absent:
+            raise UsageError(
+                f"--hold-out {absent[0]}: no moving marker has that name; moving "
+                f"markers are {list(moving)}"
+            )
+        left = tuple(n for n in given if n not in cell.hold_out)
+        if given and not left:
+            raise UsageError(
+                f"--hold-out {', '.join(cell.hold_out)} leaves nothing of {', '.join(given)} to "
+                "the filter"
+            )
+        return (Fold(left, cell.hold_out),)
     if not given or cell.baseline:
         return (Fold(given, cell.scored(moving)),)
     whole = Fold(given, tuple(n for n in moving if n not in given))
@@ -135,24 +155,6 @@ def folds_of(cell: FilterCell, ready: Ready) -> tuple[Fold, ...]:
         return (whole,)
     turns = [m for m in given if m in moving] if len(given) > 1 else []
     return (whole, *(Fold(tuple(n for n in given if n != m), (m,)) for m in turns))
-
-
-def _left(
-    given: tuple[str, ...], held_out: tuple[str, ...], moving: Sequence[str]
-) -> tuple[str, ...]:
-    """The markers that a method keeps. Raises `UsageError` for names that do not move."""
-    absent = [n for n in held_out if n not in moving]
-    if absent:
-        raise UsageError(
-            f"--hold-out {absent[0]}: no moving marker has that name; moving "
-            f"markers are {list(moving)}"
-        )
-    left = tuple(n for n in given if n not in held_out)
-    if given and not left:
-        raise UsageError(
-            f"--hold-out {', '.join(held_out)} leaves nothing of {', '.join(given)} to the filter"
-        )
-    return left
 
 
 # --- all seeds at once ---------------------------------------------------------------------------
@@ -167,7 +169,16 @@ def _all_seeds(
     z = [_by_step(r.method.offered(r.system, r.registered), offered, t) for r in every]
     if any(row is None for row in z):
         return None
-    rows, places = _rows(bench, first, fold)
+    # Rows (p, N) of the probes along the experiment's axis, then of the markers that score.
+    mesh, tracks = first.scene.mesh, _scoring(first, fold)
+    d, axis = mesh.dimension, "xyz".index(first.experiment.axis)
+    rows = np.zeros((0, mesh.nodes.size))
+    if first.scene.probes:
+        weights = probe_rows(mesh, first.scene.probes).weights.toarray()
+        rows = np.kron(weights, np.eye(d))[axis::d]
+    if tracks is not None:
+        rows = np.vstack([rows, np.kron(tracks.rows.weights.toarray(), np.eye(d))])
+    places = 0 if tracks is None else len(tracks.names)
     batch = stepper.batch(inputs, np.array(z), rows)
     if batch is None:
         return None
@@ -182,12 +193,11 @@ def _all_seeds(
     scored = []
     for i, ready in enumerate(every):
         probes = dict(zip(names, batch.values[i, :, : len(names)].T, strict=True))
-        u = batch.values[i, :, len(names) :].reshape(len(t), len(places), -1)
+        u = batch.values[i, :, len(names) :].reshape(len(t), places, -1)
         y = batch.y[i]
-        withheld = (
-            *_held_out(ready, fold, t, u, segments),
-            *ahead_errors(t, offered.names, y, measured[i], segments),
-        )
+        tracks = _scoring(ready, fold)
+        held = () if tracks is None else tracks.errors(t, u, segments, ahead=False)
+        withheld = (*held, *ahead_errors(t, offered.names, y, measured[i], segments))
         scaled = np.where(measured[i], y / offered.sd, np.nan)
         innovations = innovations_of(t, scaled, batch.log_likelihood[i], batch.dof, segments)
         truth = _against_truth(bench, first, probes)
@@ -208,59 +218,25 @@ def _by_step(measurements: Measurements, offered: Measurements, t: Floats) -> Fl
     return z
 
 
-def _rows(bench: Bench, first: Ready, fold: Fold) -> tuple[Floats, tuple[str, ...]]:
-    """Rows (p, N) of the probes along the experiment's axis and of the markers that score, and
-    the names of these."""
-    mesh = first.scene.mesh
-    d, axis = mesh.dimension, "xyz".index(first.experiment.axis)
-    probes = np.zeros((0, mesh.nodes.size))
-    if first.scene.probes:
-        weights = probe_rows(mesh, first.scene.probes).weights.toarray()
-        probes = np.kron(weights, np.eye(d))[axis::d]
-    tracks = _scoring(first, fold)
-    if tracks is None:
-        return probes, ()
-    markers = np.kron(tracks.rows.weights.toarray(), np.eye(d))
-    return np.vstack([probes, markers]), tracks.names
-
-
-def _step_times(stepper: Stepper, inputs: Floats) -> tuple[float, float]:
-    """Median and 99 % quantile (s) of the first steps, run as they are alone; the very first only
-    warms up."""
-    state, seconds = stepper.rest(), list[float]()
-    for row in inputs[: _TIMED + 1]:
-        start = perf_counter()
-        state = stepper.step(state, row)
-        seconds.append(perf_counter() - start)
-        if sum(seconds) > _TIMED_S and len(seconds) > 5:
-            break
-    p50, p99 = np.quantile(seconds[1:] or seconds, [0.5, 0.99])
-    return float(p50), float(p99)
-
-
 # --- seed by seed --------------------------------------------------------------------------------
 
 
 def _run(cell: FilterCell, ready: Ready, fold: Fold, seed: int) -> Run:
     one = ready.with_markers(fold.given)
     one = one.given_nothing() if cell.baseline == "alone" else one
-    points = _watched(ready, cell)
+    # Rows of the markers, then of the outlines that filters are given.
+    rows = [] if ready.tracks is None else [ready.tracks.rows]
+    rows += [o.distances.rows for o in outline_tracks(ready.registered, cell.given)]
+    points = None
+    if rows:
+        weights = sparse.csr_array(sparse.vstack([r.weights for r in rows]))
+        points = Rows(weights, np.concatenate([r.outside for r in rows]))
     run = one.run(cell.method, KeptFields(other_times(ready.registered), points))
     state = run.outcome.state
     if state == "finished" or (state == "invalid" and cell.baseline == "alone"):
         return run
     where = f"seed {seed}: " if cell.seed_path else ""
     raise ComparisonError(f"{where}{state} at step {run.outcome.step}: {run.outcome.why}")
-
-
-def _watched(ready: Ready, cell: FilterCell) -> Rows | None:
-    """Rows of the markers, then of the outlines that filters are given."""
-    every = [] if ready.tracks is None else [ready.tracks.rows]
-    every += [o.distances.rows for o in outline_tracks(ready.registered, cell.given)]
-    if not every:
-        return None
-    weights = sparse.csr_array(sparse.vstack([r.weights for r in every]))
-    return Rows(weights, np.concatenate([r.outside for r in every]))
 
 
 def _scored(
@@ -282,8 +258,7 @@ def _scored(
     truth = _against_truth(bench, ready, probes) if bench.experiment.repeats else {}
     nis, dof = run.traces.get("nis"), run.traces.get("nis.dof")
     if nis is None or dof is None or cell.baseline:
-        ahead = _at_given(cell, ready, run, segments)
-        predictions = _predictions(cell, ready, run, segments)
+        ahead, predictions = _open_loop(cell, ready, run, segments)
         return Scored(truth, (*held, *ahead), predictions=predictions)
     names = [n for n in run.traces if n.startswith("innovation.") and not n.endswith(".sd")]
     names = [n.removeprefix("innovation.") for n in names]
@@ -295,45 +270,31 @@ def _scored(
     return Scored(truth, (*held, *ahead), innovations, float(nis.y.sum()), int(dof.y.sum()))
 
 
-def _at_given(cell: FilterCell, ready: Ready, run: Run, segments: Segments) -> tuple[Withheld, ...]:
-    """Errors at what filters are given, of a method that is given nothing."""
+def _open_loop(
+    cell: FilterCell, ready: Ready, run: Run, segments: Segments
+) -> tuple[tuple[Withheld, ...], PredictionErrors | None]:
+    """Errors, and y - H u, at what filters are given, of a method that is given nothing."""
     u, tracks = run.points, ready.tracks
     if u is None:
-        return ()
-    errors, first = list[Withheld](), 0
+        return (), None
+    errors, columns, first = list[Withheld](), dict[str, Floats](), 0
     if tracks is not None:
         given, first = tracks.of(cell.given), len(tracks.names)
         at = [tracks.names.index(n) for n in given.names]
         errors += given.errors(run.t, u[:, at], segments, ahead=True) if at else ()
+        columns = {f"{name}.{'xyz'[c]}": u[:, i, c]
+                   for i, name in enumerate(tracks.names) for c in range(u.shape[2])}  # fmt: skip
     for outline in outline_tracks(ready.registered, cell.given):
         last = first + len(outline.distances.normals)
         errors += outline.errors(run.t, u[:, first:last], segments)
-        first = last
-    return tuple(errors)
-
-
-def _predictions(
-    cell: FilterCell, ready: Ready, run: Run, segments: Segments
-) -> PredictionErrors | None:
-    """Errors y - H u at what filters are given, of a method that is given nothing."""
-    if run.points is None:
-        return None
-    offered, start = ready.offered(cell.given), np.zeros(1)
-    columns: dict[str, Floats] = {}
-    markers = ready.tracks.names if ready.tracks is not None else ()
-    for i, name in enumerate(markers):
-        for c in range(run.points.shape[2]):
-            columns[f"{name}.{'xyz'[c]}"] = run.points[:, i, c]
-    first = len(markers)
-    for outline in outline_tracks(ready.registered, cell.given):
-        last = first + len(outline.distances.normals)
-        along = (run.points[:, first:last] * outline.distances.normals).sum(axis=2)
+        along = (u[:, first:last] * outline.distances.normals).sum(axis=2)
         columns |= {f"{outline.name}.{i}": y for i, y in enumerate(along.T)}
         first = last
+    offered, start = ready.offered(cell.given), np.zeros(1)
     t = np.concatenate([start, run.t])
     predicted = [np.interp(offered.t, t, np.append(start, columns[n])) for n in offered.names]
-    errors = offered.z - np.stack(predicted, axis=1)
-    return prediction_errors(offered.t, errors, offered.sd**2, segments)
+    left = offered.z - np.stack(predicted, axis=1)
+    return tuple(errors), prediction_errors(offered.t, left, offered.sd**2, segments)
 
 
 # --- persistence ----------------------------------------------------------------------------------
@@ -348,7 +309,11 @@ def _persistence(bench: Bench, cell: FilterCell, first: Ready) -> FilterScores:
         for ready in bench.ready(cell, seed):
             offered = ready.offered(cell.given)
             start = perf_counter()
-            last = _last_measured(offered.z)
+            # The last value of every component before each row (nt, m), zero at first.
+            last, now = np.zeros_like(offered.z), np.zeros(offered.z.shape[1])
+            for i, row in enumerate(offered.z):
+                last[i] = now
+                now = np.where(np.isfinite(row), row, now)
             seconds.append((perf_counter() - start) / len(offered.t))
             y, measured = offered.z - last, np.isfinite(offered.z)
             ahead = ahead_errors(offered.t, offered.names, np.nan_to_num(y), measured, segments)
@@ -384,15 +349,6 @@ def _held_markers(
     return tuple(held)
 
 
-def _last_measured(z: Floats) -> Floats:
-    """The last value of every component before each row (nt, m), zero at first."""
-    last, before = np.zeros(z.shape[1]), np.zeros_like(z)
-    for i, row in enumerate(z):
-        before[i] = last
-        last = np.where(np.isfinite(row), row, last)
-    return before
-
-
 def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[str, float]:
     truth = bench.truth(ready)
     if not truth:
@@ -413,13 +369,6 @@ def _held_at_probes(bench: Bench, ready: Ready, given: MarkerTracks) -> Mapping[
 def _scoring(ready: Ready, fold: Fold) -> MarkerTracks | None:
     tracks = ready.tracks
     return None if tracks is None or not fold.scores else tracks.of(fold.scores)
-
-
-def _held_out(
-    ready: Ready, fold: Fold, t: Floats, u: Floats, segments: Segments
-) -> tuple[Withheld, ...]:
-    tracks = _scoring(ready, fold)
-    return () if tracks is None else tracks.errors(t, u, segments, ahead=False)
 
 
 def _against_truth(bench: Bench, ready: Ready, traces: Mapping[str, Floats]) -> Mapping[str, float]:

@@ -98,6 +98,17 @@ def document(study: FilterStudy) -> dict[str, Any]:
 
 def _cell(cell: FilterCell, record: Record[FilterScores]) -> dict[str, Any]:
     value = record.value
+    scored: dict[str, Any] = {}
+    if value:
+        scores = {
+            name: {"mean": i.mean, "half_95": i.half, "count": i.count, "unit": value.units[name]}
+            for name, values in value.scores.items()
+            for i in (interval(values),)
+        }
+        scored = {
+            "scores": scores, **members(value, "step_s", "step_p99_s", "setup_s", "steps"),
+            "gains_repeat_from_step": value.frozen, "seeds_together": value.shared,
+        }  # fmt: skip
     return {
         "method": cell.method,
         "baseline": cell.baseline or None,
@@ -105,20 +116,8 @@ def _cell(cell: FilterCell, record: Record[FilterScores]) -> dict[str, Any]:
         "failed": record.why or None,
         "seconds": record.seconds,
         "scores": {},
-        **(_numbers(value) if value else {}),
+        **scored,
     }
-
-
-def _numbers(value: FilterScores) -> dict[str, Any]:
-    scores = {
-        name: {"mean": i.mean, "half_95": i.half, "count": i.count, "unit": value.units[name]}
-        for name, values in value.scores.items()
-        for i in (interval(values),)
-    }
-    return {
-        "scores": scores, **members(value, "step_s", "step_p99_s", "setup_s", "steps"),
-        "gains_repeat_from_step": value.frozen, "seeds_together": value.shared,
-    }  # fmt: skip
 
 
 def cells_table(study: FilterStudy) -> NumberTable:
@@ -176,7 +175,15 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
         axes += [a for a in swept if not a.path.startswith(METHODS)]
         if not axes:
             continue
-        fixed = _fixed(study, method, axes[2:])
+        # Further axes are fixed at the method's best cell.
+        ranked = [
+            r
+            for ranking in study.rankings
+            for r in ranking.rows
+            if r.cell.method == method and not r.cell.baseline
+        ]
+        best = min(ranked, key=lambda r: r.score.mean).cell.values if ranked else {}
+        fixed = {a.path: best[a.path] for a in axes[2:]} if ranked else {}
         of_method = [c for c in study.plan.cells if c.method == method and not c.baseline]
         cells = [c for c in of_method if fixed.items() <= c.values.items()]
         if fixed:
@@ -197,19 +204,6 @@ def over_axes(study: FilterStudy) -> Iterator[Exhibit]:
 
 def _unit(study: FilterStudy) -> str:
     return shown_unit(study.unit)[1]
-
-
-def _fixed(study: FilterStudy, method: str, axes: Sequence[Axis]) -> dict[str, str]:
-    rows = [
-        r
-        for ranking in study.rankings
-        for r in ranking.rows
-        if r.cell.method == method and not r.cell.baseline
-    ]
-    if not rows or not axes:
-        return {}
-    best = min(rows, key=lambda r: r.score.mean).cell.values
-    return {a.path: best[a.path] for a in axes}
 
 
 def _value(study: FilterStudy, cell: FilterCell, what: str) -> float | None:
@@ -387,8 +381,16 @@ def study_exhibits(study: FilterStudy) -> tuple[Exhibit, ...]:
     """Figures and tables: settings, intervals, times and consistency, in this order."""
     exhibits = [best_exhibit(study), _ranking_exhibit(study), *chosen_exhibits(study)]
     exhibits += [_pareto_exhibit(study), *over_axes(study)]
-    failed = _failed_exhibit(study)
-    return (*exhibits, *((failed,) if failed else ()))
+    failed = [pair for ranking in study.rankings for pair in ranking.failed]
+    if failed:
+        columns: Mapping[str, Shown] = {
+            "method": lambda pair: pair[0].name, "settings": lambda pair: named(pair[0].settings),
+            "condition": lambda pair: named(pair[0].condition), "why": lambda pair: pair[1],
+        }  # fmt: skip
+        title = f"{len(failed)} of {len(study.plan.cells)} cells failed"
+        listed = table("failed", title, failed[:200], columns)
+        exhibits.append(Exhibit("failed", "Cells that failed", (), (listed,)))
+    return tuple(exhibits)
 
 
 def ranking_table(
@@ -573,17 +575,3 @@ def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
 
 
 # --- failures ------------------------------------------------------------------------------------
-
-
-def _failed_exhibit(study: FilterStudy) -> Exhibit | None:
-    failed = [pair for ranking in study.rankings for pair in ranking.failed]
-    if not failed:
-        return None
-    columns: Mapping[str, Shown] = {
-        "method": lambda pair: pair[0].name, "settings": lambda pair: named(pair[0].settings),
-        "condition": lambda pair: named(pair[0].condition), "why": lambda pair: pair[1],
-    }  # fmt: skip
-    title = f"{len(failed)} of {len(study.plan.cells)} cells failed"
-    return Exhibit(
-        "failed", "Cells that failed", (), (table("failed", title, failed[:200], columns),)
-    )

@@ -165,8 +165,13 @@ def plan(
         hold_out=hold_out,
         tracker=chosen[0],
     )
-    if not options.methods and not experiment.repeats:
-        methods = tuple(dict.fromkeys((*methods, *_plain(experiment, methods))))
+    known, declared = experiment.methods, experiment.uncertainty
+    if not options.methods and not experiment.repeats and all(known[m].markers for m in methods):
+        # A plain solver beside filters: the one that inputs are varied by, else one that is
+        # accepted; none where there is none at all.
+        names = (declared.surrogate if declared else "", experiment.reference, *experiment.accepted)
+        plain = [n for n in names if n in known and not known[n].markers]
+        methods = tuple(dict.fromkeys((*methods, *plain[:1])))
     of_methods = [replace(bare, method=m) for m in methods]
     cells = [c for one in of_methods for c in _cells(experiment, job, one, axes)]
     beside = [replace(bare, method=chosen[0], baseline="persistence")]
@@ -229,17 +234,6 @@ def _methods(
         )
     swept = [a.path.split(".")[1] for a in axes if a.path.startswith(METHODS)]
     return chosen or tuple(n for n in whole if n in swept) or usual
-
-
-def _plain(experiment: Experiment, methods: Sequence[str]) -> tuple[str, ...]:
-    """A plain solver beside filters: the one that inputs are varied by, else one that is accepted;
-    none where there is one already, or none at all."""
-    known = experiment.methods
-    if any(not known[m].markers for m in methods):
-        return ()
-    by = experiment.uncertainty.surrogate if experiment.uncertainty else ""
-    names = (by, experiment.reference, *experiment.accepted)
-    return tuple(n for n in names if n in known and not known[n].markers)[:1]
 
 
 def _usual(experiment: Experiment) -> set[str]:

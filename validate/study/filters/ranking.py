@@ -20,7 +20,7 @@ from validate.pipeline.run.case_solution import KeptFields
 from validate.pipeline.run.job import study_folder
 from validate.register.markers.markers import MarkerObservation
 from validate.report.views.view_filling import Shown, objects, table
-from validate.study.filters.plan import Bench, FilterCell, Ready, open_bench, plan
+from validate.study.filters.plan import Bench, FilterCell, open_bench, plan
 from validate.study.filters.score import (
     LOG_LOSS,
     POOLED,
@@ -333,14 +333,7 @@ def _changes(cell: FilterCell, method: Method, *, quick: bool) -> list[FilterCha
 
 def run_change(bench: Bench, change: FilterChange) -> FilterEnding:
     """Raise what the settings or the registration refuse."""
-    ready = _changed(bench.ready(change.cell, change.cell.seeds[0])[0], change)
-    steps = min(STEPS, len(ready.registered.t))
-    ready = replace(ready, method=replace(ready.method, steps=steps))
-    end = ready.run(change.cell.method, KeptFields(ready.registered.t[:1])).outcome
-    return FilterEnding(end.state, end.step, steps, end.why)
-
-
-def _changed(ready: Ready, change: FilterChange) -> Ready:
+    ready = bench.ready(change.cell, change.cell.seeds[0])[0]
     method, factor = ready.method, change.factor
     if change.what == "dropped samples":
         # That share of the samples of all markers is missing
@@ -354,19 +347,21 @@ def _changed(ready: Ready, change: FilterChange) -> Ready:
             return replace(sensor, x=x)
 
         observations = tuple(without(o) for o in ready.registered.observations)
-        return replace(ready, registered=replace(ready.registered, observations=observations))
-    if change.what == "step":
+        ready = replace(ready, registered=replace(ready.registered, observations=observations))
+    elif change.what == "step":
         split, stride = (round(1 / factor), 1) if factor < 1 else (1, round(factor))
-        return replace(ready, method=replace(method, split=split, stride=stride))
-    if not change.setting:
-        return ready
-    value = getattr(method.settings, change.setting)
-    if value is None:  # that of the measurements
-        value = float((method.offered(ready.system, ready.registered).sd ** 2).mean())
-    scaled = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
-    return replace(
-        ready, method=replace(method, settings=replace(method.settings, **{change.setting: scaled}))
-    )
+        ready = replace(ready, method=replace(method, split=split, stride=stride))
+    elif change.setting:
+        value = getattr(method.settings, change.setting)
+        if value is None:  # that of the measurements
+            value = float((method.offered(ready.system, ready.registered).sd ** 2).mean())
+        scaled = tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
+        settings = replace(method.settings, **{change.setting: scaled})
+        ready = replace(ready, method=replace(method, settings=settings))
+    steps = min(STEPS, len(ready.registered.t))
+    ready = replace(ready, method=replace(ready.method, steps=steps))
+    end = ready.run(change.cell.method, KeptFields(ready.registered.t[:1])).outcome
+    return FilterEnding(end.state, end.step, steps, end.why)
 
 
 # --- report -------------------------------------------------------------------------------------

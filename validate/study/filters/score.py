@@ -334,9 +334,17 @@ def nested(
         for name, totals in others.items():
             totals += [reported[name][0].sum(), reported[name][1].sum()]
     beside = {n: _root(by, float(q / c)) for n, (q, c) in others.items() if c}
-    return Nested(
-        _reported(squares, counts, by, blocks), chosen, beside, blocks.count, len(common) > 1
-    )
+    if seeds > 1:
+        means = squares.sum(axis=1) / counts.sum(axis=1)
+        error = interval([_root(by, float(mean)) for mean in means])
+    else:
+        sampled = counts[0] > 0
+        means = squares[0, sampled] / counts[0, sampled]
+        score = _root(by, float(squares.sum() / counts.sum()))
+        half = interval(means.tolist()).half if blocks.sure else None
+        half = None if half is None else half / _slope(by, score, score)
+        error = SeedInterval(score, half, int(sampled.sum()))
+    return Nested(error, chosen, beside, blocks.count, len(common) > 1)
 
 
 def _parts(value: FilterScores, by: str) -> set[str]:
@@ -368,15 +376,3 @@ def _without(sums: tuple[Floats, Floats], seed: int, block: int) -> float:
 def _root(by: str, mean: float) -> float:
     """A score of the mean over its samples: log loss is that mean, an rms its root."""
     return mean if by == LOG_LOSS else float(np.sqrt(mean))
-
-
-def _reported(squares: Floats, counts: Floats, by: str, blocks: Blocks) -> SeedInterval:
-    if len(squares) > 1:
-        totals = squares.sum(axis=1) / counts.sum(axis=1)
-        return interval([_root(by, float(mean)) for mean in totals])
-    sampled = counts[0] > 0
-    means = squares[0, sampled] / counts[0, sampled]
-    score = _root(by, float(squares.sum() / counts.sum()))
-    half = interval(means.tolist()).half if blocks.sure else None
-    half = None if half is None else half / _slope(by, score, score)
-    return SeedInterval(score, half, int(sampled.sum()))

@@ -135,7 +135,13 @@ def study(
     """
     declared = find(experiment, Path.cwd()) if isinstance(experiment, str) else experiment
     options = Options(dict(values or {}), methods, quick)
-    planned = plan(declared, options, axes(sweeps or _declared(declared, options)), seeds, hold_out)
+    # The sweeps that the experiment declares, of the chosen methods, where none is given.
+    chosen = methods or tuple(declared.methods)
+    own = [
+        s.text for s in declared.sweeps
+        if not s.path.startswith("methods.") or s.path.split(".")[1] in chosen
+    ]  # fmt: skip
+    planned = plan(declared, options, axes(sweeps or own), seeds, hold_out)
     work = Plan(planned.job, planned.cells, open_bench, run_cell, FilterScores)
     done = finish(work, study_folder(declared, KIND, out) / CELLS, where, report)
     # Where every filter failed, nothing is compared
@@ -153,13 +159,14 @@ def study(
     return FilterStudy(planned, by, done, rankings(planned.cells, done.records, by))
 
 
-def _declared(experiment: Experiment, options: Options) -> list[str]:
-    """The sweeps that the experiment declares, of the chosen methods."""
-    chosen = options.methods or tuple(experiment.methods)
-    return [
-        s.text for s in experiment.sweeps
-        if not s.path.startswith("methods.") or s.path.split(".")[1] in chosen
-    ]  # fmt: skip
+def _require_score(done: Finished[FilterScores], by: str) -> None:
+    good = [r.value for r in done.records.values() if r.value is not None]
+    if not good:
+        why = next(iter(done.records.values())).why
+        raise ComparisonError(f"all {len(done.records)} cells failed, 0 compared; the first: {why}")
+    names = {name for value in good for name in value.scores}
+    if by not in names:
+        raise UsageError(f"no score '{by}' to rank by; {nearest_names(by, names)}")
 
 
 def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
@@ -168,18 +175,6 @@ def usual_score(done: Finished[FilterScores], *, in_turn: bool) -> str:
     usual = (POOLED, HELD_OUT if in_turn else WITHHELD, AHEAD)
     names = (*usual, *(filters[0].scores if filters else ()))
     return next((n for n in names if all(n in v.scores for v in filters)), POOLED)
-
-
-def _require_score(done: Finished[FilterScores], by: str) -> None:
-    good = [r.value for r in done.records.values() if r.value is not None]
-    if not good:
-        first = next(iter(done.records.values()))
-        raise ComparisonError(
-            f"all {len(done.records)} cells failed, 0 compared; the first: {first.why}"
-        )
-    names = {name for value in good for name in value.scores}
-    if by not in names:
-        raise UsageError(f"no score '{by}' to rank by; {nearest_names(by, names)}")
 
 
 def _best(planned: FilterPlan, ranking: Ranking, by: str) -> Best:

@@ -218,20 +218,8 @@ def innovations_of(
     t: Floats, scaled: Floats, log_likelihood: Floats, dof: Floats, segments: Segments
 ) -> Innovations:
     """Of innovations over their standard deviations (nt, m), NaN = none."""
-    lag, lag_1 = _correlation(scaled)
-    measured = t[np.isfinite(scaled).any(axis=1)]
-    every = float(np.median(np.diff(measured))) if len(measured) > 1 else 0.0
-    return Innovations(
-        segments.sums(t, log_likelihood)[None],
-        segments.sums(t, dof)[None],
-        None if lag is None else lag * every,
-        lag_1,
-    )
-
-
-def _correlation(scaled: Floats) -> tuple[int | None, float | None]:
-    """The lag in samples from which the autocorrelation of every component stays within 1/e, and
-    the largest of neighbours; None for fewer than 8 samples."""
+    # The lag in samples from which the autocorrelation of every component stays within 1/e, and
+    # the largest of neighbours; none for fewer than 8 samples.
     lags, firsts = [], []
     for e in scaled.T:
         e = e[np.isfinite(e)]
@@ -242,7 +230,14 @@ def _correlation(scaled: Floats) -> tuple[int | None, float | None]:
         beyond = np.flatnonzero(np.abs(r) > _DECAYED)
         lags.append(int(beyond[-1]) + 2 if len(beyond) else 1)
         firsts.append(float(r[0]))
-    return (max(lags), max(firsts, key=abs)) if lags else (None, None)
+    measured = t[np.isfinite(scaled).any(axis=1)]
+    every = float(np.median(np.diff(measured))) if len(measured) > 1 else 0.0
+    return Innovations(
+        segments.sums(t, log_likelihood)[None],
+        segments.sums(t, dof)[None],
+        max(lags) * every if lags else None,
+        max(firsts, key=abs, default=None),
+    )
 
 
 def read_innovations(run: Run, names: Sequence[str]) -> tuple[Floats, Floats]:

@@ -105,7 +105,12 @@ def drift(scheme: Stepping, h: float, omegas: Floats) -> Drift:
     """All modes (r,) 1/s, each from amplitude 1/w at rest, stepped 1e5 times by the step map."""
     rates = Rates(omegas * h, 0.0, 0.0)
     maps = scheme.maps(rates)
-    start = _start(rates.x, maps.shape[-1])
+    # States (m, r) with the same strain energy in every mode, at rest and in balance. Two members
+    # are u and its last increment, from which the half step behind has rest in it.
+    x = rates.x
+    q = 1 / x
+    members = [q, x * x * q / 2] if maps.shape[-1] == 2 else [q, 0 * q, -x * x * q]
+    start = np.stack(members)
     found = []
     for kind in (np.float64, np.float32):
         state = start.astype(kind)
@@ -117,14 +122,6 @@ def drift(scheme: Stepping, h: float, omegas: Floats) -> Drift:
         ratio = energy / _energy(scheme, rates.x, start)
         found.append(float(ratio) if np.isfinite(ratio) else None)
     return Drift(scheme.name, h, *found)
-
-
-def _start(x: Floats, size: int) -> Floats:
-    """States (m, r) with the same strain energy in every mode, at rest and in balance."""
-    q = 1 / x
-    if size == 2:  # u and its last increment, from which the half step behind has rest in it
-        return np.stack([q, x * x * q / 2])
-    return np.stack([q, 0 * q, -x * x * q])
 
 
 def _energy(scheme: Stepping, x: Floats, state: Floats) -> float:

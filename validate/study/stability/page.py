@@ -42,11 +42,35 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
         "resolve' means fewer than ten steps in the slowest period.",
     )
     pairs = ((c.variant, study.done.records[c.key].why) for c in study.cells)
-    columns = {**_variant("0"), "why": "1"}
+    columns: Mapping[str, Shown] = {**_variant("0"), "why": "1"}
     shown = table("refused", "Refused schemes and reasons", (p for p in pairs if p[1]), columns)
+    columns = {
+        "claim": "name", "worst / 1": "value", "limit / 1": "limit", "count": "count",
+        "verdict": lambda p: "holds" if p.holds else "fails", "what": "why",
+    }  # fmt: skip
+    claims = table("predictions", "Predicted and measured limits", study.predictions, columns)
+    of_claims = (
+        "Measured: the spectral radius of the step map over all modes of the body; a limit is "
+        "the step at which it passes 1 (bisection). Predicted: the formula of each scheme "
+        "with the highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one "
+        "step map.",
+        "Large strain schemes (central, newton_dynamics) are evaluated at rest, where they "
+        "are linear; their limit changes as the body deforms.",
+    )
+    papers = []
+    if study.base.papers:
+        found = [one for paper in study.base.papers for one in _of_paper(study, paper)]
+        columns = {
+            "setting": "0.label", "source": "0.source", "h / ms": "1.dt", "scheme": "1.scheme",
+            "regime": lambda one: _WORDS[REGIMES.index(one[1].regime)], "radius / 1": "1.radius",
+            "h over limit / 1": lambda one: one[2] and one[0].dt / one[2], "why": "1.why",
+        }  # fmt: skip
+        note = "Refused: the scheme does not run with that material, so there is no radius."
+        title = "Settings of the papers"
+        papers = [Exhibit("papers", title, (), (table("papers", title, found, columns, note),))]
     return (
-        _claims(study),
-        *((_papers(study),) if study.base.papers else ()),
+        Exhibit("predictions", "Predictions", of_claims, (claims,)),
+        *papers,
         Exhibit("maps", "Stability limits of all schemes", words, regimes=maps),
         _limits(study),
         _conditions(study),
@@ -58,35 +82,6 @@ def stability_exhibits(study: Stability) -> tuple[Exhibit, ...]:
 def _variant(at: str) -> Mapping[str, Shown]:
     """What tables show of the variant that stands there in their records."""
     return {heading: f"{at}.{name}" for heading, name in _VARIANT.items()}
-
-
-def _claims(study: Stability) -> Exhibit:
-    columns: Mapping[str, Shown] = {
-        "claim": "name", "worst / 1": "value", "limit / 1": "limit", "count": "count",
-        "verdict": lambda p: "holds" if p.holds else "fails", "what": "why",
-    }  # fmt: skip
-    claims = table("predictions", "Predicted and measured limits", study.predictions, columns)
-    words = (
-        "Measured: the spectral radius of the step map over all modes of the body; a limit is "
-        "the step at which it passes 1 (bisection). Predicted: the formula of each scheme "
-        "with the highest frequency by Lanczos. CG, Gauss-Seidel and direct solvers share one "
-        "step map.",
-        "Large strain schemes (central, newton_dynamics) are evaluated at rest, where they "
-        "are linear; their limit changes as the body deforms.",
-    )
-    return Exhibit("predictions", "Predictions", words, (claims,))
-
-
-def _papers(study: Stability) -> Exhibit:
-    found = [one for paper in study.base.papers for one in _of_paper(study, paper)]
-    columns: Mapping[str, Shown] = {
-        "setting": "0.label", "source": "0.source", "h / ms": "1.dt", "scheme": "1.scheme",
-        "regime": lambda one: _WORDS[REGIMES.index(one[1].regime)], "radius / 1": "1.radius",
-        "h over limit / 1": lambda one: one[2] and one[0].dt / one[2], "why": "1.why",
-    }  # fmt: skip
-    note = "Refused: the scheme does not run with that material, so there is no radius."
-    title = "Settings of the papers"
-    return Exhibit("papers", title, (), (table("papers", title, found, columns, note),))
 
 
 def _of_paper(
@@ -154,20 +149,16 @@ def _panel(
 def _marks(study: Stability, name: str, rows: list[Turned]) -> Iterator[Mark]:
     """Papers' settings whose value of this quantity is a row, or lies between two of E."""
     for paper in study.base.papers:
-        at = _row_of(name, paper.variant, rows)
-        if at is not None:
-            on_map = any(_alike(paper.variant, v, name) for v in rows)
-            yield Mark(paper.label, paper.dt, at, on_map)
-
-
-def _row_of(name: str, v: Turned, rows: list[Turned]) -> float | None:
-    if name == "E":
-        known = [(i, r.E) for i, r in enumerate(rows) if r.E > 0]
-        indices, logs = [i for i, _ in known], [float(np.log(e)) for _, e in known]
-        return float(np.interp(np.log(v.E), logs, indices))
-    texts = [_text(name, r) for r in rows]
-    own = _text(name, v)
-    return float(texts.index(own)) if own in texts else None
+        if name == "E":
+            known = [(i, r.E) for i, r in enumerate(rows) if r.E > 0]
+            indices, logs = [i for i, _ in known], [float(np.log(e)) for _, e in known]
+            at = float(np.interp(np.log(paper.variant.E), logs, indices))
+        else:
+            texts, own = [_text(name, r) for r in rows], _text(name, paper.variant)
+            if own not in texts:
+                continue
+            at = float(texts.index(own))
+        yield Mark(paper.label, paper.dt, at, any(_alike(paper.variant, v, name) for v in rows))
 
 
 def _alike(one: Turned, other: Turned, name: str) -> bool:

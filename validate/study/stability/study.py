@@ -133,21 +133,19 @@ def points(
                 yield Point(cell, scheme, dt, "refused", None, record.why)
         return
     for found in record.value.schemes:
+        stepping = declared()[found.scheme]
         for dt, radius in zip(cell.steps, found.radii, strict=True):
-            yield Point(cell, found.scheme, dt, *_regime(found, record.value, dt, radius))
-
-
-def _regime(
-    found: SchemeResult, result: Stepped, dt: float, radius: float
-) -> tuple[Regime, float, str]:
-    scheme = declared()[found.scheme]
-    if radius > 1 + scheme.rounding:
-        times = "" if found.predicted is None else f"{dt / found.predicted:.4g} times the limit"
-        return "unstable", radius, times
-    turn = result.lowest * dt
-    if turn > RESOLVED and scheme.name not in ("quasi_static", "modal"):
-        return "unresolved", radius, f"h too large to resolve: {turn:.3g} rad of the slowest mode"
-    return "stable", radius, ""
+            turn = record.value.lowest * dt
+            regime: Regime = "stable"
+            why = ""
+            if radius > 1 + stepping.rounding:
+                regime = "unstable"
+                if found.predicted is not None:
+                    why = f"{dt / found.predicted:.4g} times the limit"
+            elif turn > RESOLVED and stepping.name not in ("quasi_static", "modal"):
+                regime = "unresolved"
+                why = f"h too large to resolve: {turn:.3g} rad of the slowest mode"
+            yield Point(cell, found.scheme, dt, regime, radius, why)
 
 
 # --- what is claimed ------------------------------------------------------------------------------
@@ -157,7 +155,12 @@ def _predictions(study: Stability) -> Iterator[Prediction]:
     for name in study.schemes:
         own = [s for r in study.ran for s in r.schemes if s.scheme == name]
         yield (_limit if declared()[name].limit else _no_limit)(name, own)
-    yield _drift(study.ran)
+    kept = [d for r in study.ran for d in r.drifts if declared()[d.scheme].conserves]
+    changes = [abs(d.double - 1) for d in kept if d.double is not None]
+    worst = max(changes, default=None)
+    holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE
+    why = "energy of conservative schemes over 1e5 undamped steps in float64"
+    yield Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)
     # Exactly those that cannot be are refused, each for its own reason
     wrong = []
     for cell in study.cells:
@@ -195,12 +198,3 @@ def _no_limit(name: str, own: list[SchemeResult]) -> Prediction:
     worst, border = max(over, default=None), declared()[name].rounding
     holds = worst is not None and worst <= border
     return Prediction(f"no_limit.{name}", worst, border, len(over), holds, "radius less 1")
-
-
-def _drift(ran: tuple[Stepped, ...]) -> Prediction:
-    kept = [d for r in ran for d in r.drifts if declared()[d.scheme].conserves]
-    changes = [abs(d.double - 1) for d in kept if d.double is not None]
-    worst = max(changes, default=None)
-    holds = worst is not None and len(changes) == len(kept) and worst <= DRIFT_TOLERANCE
-    why = "energy of conservative schemes over 1e5 undamped steps in float64"
-    return Prediction("drift", worst, DRIFT_TOLERANCE, len(changes), holds, why)

@@ -101,10 +101,32 @@ def write_overview(reports: Path) -> Path:
     Raises what `stored` and `replace_folder` raise.
     """
     found = stored(reports)
-    words = [s.verdict for s in found]
-    counted = ", ".join(f"{words.count(w)} {w}" for w in dict.fromkeys(words))
-    tables = (_table(found), *_pages(reports))
-    exhibit = Exhibit("runs", "Stored runs", (), tables, _trends(found))
+    verdicts = [s.verdict for s in found]
+    counted = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+    # Links to the pages beside this one: over several runs, and of studies.
+    over = [(words, reports / name / "report.html") for name, words in _OVER.items()]
+    studies = sorted(reports.glob("*/study-*/report.html"))
+    over += [(f"study of {f.parents[1].name}: {f.parent.name.removeprefix('study-')}", f)
+             for f in studies]  # fmt: skip
+    rows = tuple(
+        (TableCell(words, link=f"../{file.relative_to(reports).as_posix()}"),)
+        for words, file in over if file.is_file()
+    )  # fmt: skip
+    tables = [_table(found)]
+    if rows:
+        title = "Pages over several runs, and of studies"
+        tables.append(NumberTable("", title, ("page",), rows))
+    # The largest share of a limit, run by run, of what ran more than once.
+    series = []
+    for one in found:
+        points = [(i + 1.0, s) for i, run in enumerate(one.runs) if (s := share(run)) is not None]
+        if len(points) > 1:
+            x, y = np.array(points).T
+            series.append(Series(one.folder, x, y))
+    trend = Chart("trend", "Largest |E| over its limit, run by run", "run, the oldest is 1",
+                  "largest |E| / limit", tuple(series), (("limit", 1.0),))  # fmt: skip
+    charts = (trend,) if series else ()
+    exhibit = Exhibit("runs", "Stored runs", (), tuple(tables), charts)
     told = ("overview", "All stored runs", reports.resolve().name,
             f"{len(found)} stored run{'s' if len(found) != 1 else ''}: {counted}.")  # fmt: skip
     members = [
@@ -136,35 +158,4 @@ def _table(found: Sequence[StoredRun]) -> NumberTable:
         "(of those checks) above 1 fails for its value alone; the verdict counts 2 u_val, too. "
         "Bias and scatter over all of them: validate summary.",
         below="changed since the run before",
-    )  # fmt: skip
-
-
-def _pages(reports: Path) -> tuple[NumberTable, ...]:
-    """Links to the pages beside this one: over several runs, and of studies."""
-    over = [(words, reports / name / "report.html") for name, words in _OVER.items()]
-    studies = sorted(reports.glob("*/study-*/report.html"))
-    over += [(f"study of {f.parents[1].name}: {f.parent.name.removeprefix('study-')}", f)
-             for f in studies]  # fmt: skip
-    rows = tuple(
-        (TableCell(words, link=f"../{file.relative_to(reports).as_posix()}"),)
-        for words, file in over if file.is_file()
-    )  # fmt: skip
-    if not rows:
-        return ()
-    return (NumberTable("", "Pages over several runs, and of studies", ("page",), rows),)
-
-
-def _trends(found: Sequence[StoredRun]) -> tuple[Chart, ...]:
-    """The largest share of a limit, run by run, of what ran more than once."""
-    series = []
-    for one in found:
-        points = [(i + 1.0, s) for i, run in enumerate(one.runs) if (s := share(run)) is not None]
-        if len(points) > 1:
-            x, y = np.array(points).T
-            series.append(Series(one.folder, x, y))
-    if not series:
-        return ()
-    return (
-        Chart("trend", "Largest |E| over its limit, run by run", "run, the oldest is 1",
-              "largest |E| / limit", tuple(series), (("limit", 1.0),)),
     )  # fmt: skip

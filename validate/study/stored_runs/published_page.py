@@ -42,8 +42,45 @@ def write_published(reports: Path, checked: Sequence[Json]) -> Path | None:
     moved = f"; {len(fallen)} no longer hold" if fallen else ""
     sentence = f"{len(results)} printed results of {len(entries)} experiments: {_counted(results)}"
     told = ("published", "Printed figures, and ours", "validate check", f"{sentence}{moved}.")
-    exhibits = (Exhibit("figures", "All experiments", (), (_summary(entries, reports),),
-                        intervals=_differences(entries)), *map(_section, entries))  # fmt: skip
+    stored = {n for n in found if (reports / n / "report.html").is_file()}
+    links = {n: f"../{n}/report.html" if n in stored else "" for n in found}
+    rows = tuple(
+        (
+            TableCell(c["experiment"], emphasis="strong", link=links[c["experiment"]]),
+            c["source"],
+            TableCell(_counted(p for p in c["published"] if p["result"])),
+            TableCell("holds" if c["holds"] else "does not hold",
+                      emphasis="good" if c["holds"] else "bad"),
+            c["checked"][:16].replace("T", " "),
+        )
+        for c in entries
+    )  # fmt: skip
+    summary = NumberTable(
+        "experiments", "Experiments with printed figures",
+        ("experiment", "source", "printed results", "declared verdicts", "checked, UTC"), rows,
+        "A result counts as reproduced within the tolerance that the experiment declares, at most "
+        "a tenth of the printed number. Settings, sketches and citations are not counted.",
+    )  # fmt: skip
+    # Every figure with two numbers and a tolerance: their difference over it.
+    lines = [(c["experiment"], p) for c in entries for p in c["published"]
+             if p["result"] and None not in (p["ours"], p["theirs"], p["tolerance"])
+             and p["tolerance"] > 0]  # fmt: skip
+    figures = [p for _, p in lines]
+    differences = Intervals(
+        "figures", "Our number minus the printed one",
+        tuple(f"{name}: {p['name']}" for name, p in lines),
+        np.array([p["ours"] - p["theirs"] for p in figures]),
+        np.zeros(len(figures)),
+        np.array([p["tolerance"] for p in figures]),
+        tuple(f"{with_unit(p['ours'], p['unit'])}, printed {with_unit(p['theirs'], p['unit'])}"
+              for p in figures),
+        tuple(p["verdict"] for p in figures),
+        "Only figures with a printed number, a value of ours and a tolerance.",
+        across=_ACROSS,
+    )  # fmt: skip
+    exhibits = (Exhibit("figures", "All experiments", (), (summary,),
+                        intervals=(differences,) if lines else ()),
+                *map(_section, entries))  # fmt: skip
     document = {"page": FOLDER, "experiments": entries}
     return write_loose(told, exhibits, document, reports / FOLDER, "Checked")
 
@@ -63,53 +100,6 @@ def _counted(results: Iterable[Json]) -> str:
     counts = Counter(str(p["verdict"]) for p in results)
     order = sorted(counts, key=lambda v: (_ORDER.index(v) if v in _ORDER else len(_ORDER), v))
     return ", ".join(f"{counts[v]} {v}" for v in order) or "none"
-
-
-def _summary(entries: Sequence[Json], reports: Path) -> NumberTable:
-    names = [c["experiment"] for c in entries]  # a link where their own report is stored
-    stored = {n for n in names if (reports / n / "report.html").is_file()}
-    links = {n: f"../{n}/report.html" if n in stored else "" for n in names}
-    rows = tuple(
-        (
-            TableCell(c["experiment"], emphasis="strong", link=links[c["experiment"]]),
-            c["source"],
-            TableCell(_counted(p for p in c["published"] if p["result"])),
-            TableCell("holds" if c["holds"] else "does not hold",
-                      emphasis="good" if c["holds"] else "bad"),
-            c["checked"][:16].replace("T", " "),
-        )
-        for c in entries
-    )  # fmt: skip
-    return NumberTable(
-        "experiments", "Experiments with printed figures",
-        ("experiment", "source", "printed results", "declared verdicts", "checked, UTC"), rows,
-        "A result counts as reproduced within the tolerance that the experiment declares, at most "
-        "a tenth of the printed number. Settings, sketches and citations are not counted.",
-    )  # fmt: skip
-
-
-def _differences(entries: Sequence[Json]) -> tuple[Intervals, ...]:
-    """Every figure with two numbers and a tolerance: their difference over it."""
-    lines = [(c["experiment"], p) for c in entries for p in c["published"]
-             if p["result"] and None not in (p["ours"], p["theirs"], p["tolerance"])
-             and p["tolerance"] > 0]  # fmt: skip
-    if not lines:
-        return ()
-    figures = [p for _, p in lines]
-    return (
-        Intervals(
-            "figures", "Our number minus the printed one",
-            tuple(f"{name}: {p['name']}" for name, p in lines),
-            np.array([p["ours"] - p["theirs"] for p in figures]),
-            np.zeros(len(figures)),
-            np.array([p["tolerance"] for p in figures]),
-            tuple(f"{with_unit(p['ours'], p['unit'])}, printed {with_unit(p['theirs'], p['unit'])}"
-                  for p in figures),
-            tuple(p["verdict"] for p in figures),
-            "Only figures with a printed number, a value of ours and a tolerance.",
-            across=_ACROSS,
-        ),
-    )  # fmt: skip
 
 
 def _section(entry: Json) -> Exhibit:

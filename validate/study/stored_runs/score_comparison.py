@@ -154,7 +154,14 @@ def side_by_side(runs: Sequence[StoredRun]) -> SideBySide:
         raise ComparisonError(
             f"0 scores shared, nothing compared: {have}" + (f"; {warnings[-1]}" if warnings else "")
         )
-    return SideBySide(runs, columns, tuple(rows), _parameters(runs), tuple(warnings), by_score)
+    # Parameters whose values differ, or that a run lacks, with every run's value as text. Settings
+    # of a method that only one run has are no difference: that run has the method.
+    common = {m for r in runs for m in r.methods if sum(m in o.methods for o in runs) >= 2}
+    every = dict.fromkeys(p for r in runs for p in r.parameters)
+    paths = [p for p in every if not p.startswith("methods.") or p.split(".")[1] in common]
+    texts = {p: tuple(_shown(r.parameters.get(p)) for r in runs) for p in paths}
+    differing = {p: of_runs for p, of_runs in texts.items() if len(set(of_runs)) > 1}
+    return SideBySide(runs, columns, tuple(rows), differing, tuple(warnings), by_score)
 
 
 Found = list[tuple[tuple[str, str], list[LongRow | None]]]
@@ -176,18 +183,6 @@ def _warnings(runs: tuple[StoredRun, ...], names: tuple[str, ...]) -> list[str]:
         if len(units) > 1:
             found.append(f"parameter {path} is in {' and in '.join(sorted(units))}")
     return found
-
-
-def _parameters(runs: tuple[StoredRun, ...]) -> dict[str, tuple[str, ...]]:
-    """Paths whose values differ, or that a run lacks, with every run's value as text.
-
-    Settings of a method that only one run has are no difference: that run has the method.
-    """
-    shared = {m for r in runs for m in r.methods if sum(m in o.methods for o in runs) >= 2}
-    every = dict.fromkeys(p for r in runs for p in r.parameters)
-    paths = [p for p in every if not p.startswith("methods.") or p.split(".")[1] in shared]
-    rows = {p: tuple(_shown(r.parameters.get(p)) for r in runs) for p in paths}
-    return {p: row for p, row in rows.items() if len(set(row)) > 1}
 
 
 def _shown(parameter: tuple[Any, str] | None) -> str:
@@ -374,16 +369,14 @@ _PAIR = {
 
 def _pair(number: int, pair: Pair) -> Exhibit:
     scores = table(f"pair_{number}", "Scores that both have, SI.", pair.rows, _PAIR)
-    return Exhibit(f"pair-{number}", f"{pair.one}, then {pair.other}", (), (scores,),
-                   pictures=_pictures(number, pair))  # fmt: skip
-
-
-def _pictures(number: int, pair: Pair) -> tuple[Picture, ...]:
-    from validate.report.charts.changes import picture
-
+    pictures: tuple[Picture, ...] = ()
     changed = [(f"{r.method}: {r.score}" if r.method else r.score, r.changes[1]) for r in pair.rows]
     drawn = [(name, c) for name, c in changed if c is not None][:_DRAWN]
-    if not drawn or number > _PICTURES:
-        return ()
-    labels, changes = zip(*drawn, strict=True)
-    return (picture(f"changes_{number}", f"From {pair.one} to {pair.other}", labels, changes),)
+    if drawn and number <= _PICTURES:
+        from validate.report.charts.changes import picture
+
+        labels, changes = zip(*drawn, strict=True)
+        title = f"From {pair.one} to {pair.other}"
+        pictures = (picture(f"changes_{number}", title, labels, changes),)
+    return Exhibit(f"pair-{number}", f"{pair.one}, then {pair.other}", (), (scores,),
+                   pictures=pictures)  # fmt: skip

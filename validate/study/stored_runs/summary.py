@@ -16,7 +16,7 @@ from validate.compare.verdict import NO_EVIDENCE
 from validate.errors import RecordingError, UsageError
 from validate.numbers import scale, shown_unit, significant, text, to_decimal_of, with_unit
 from validate.report.export.table_file import stored_table
-from validate.report.long_table import LongTable, checks_of
+from validate.report.long_table import checks_of
 from validate.report.stored.json_values import Json
 from validate.report.stored.tables import report_folders
 from validate.report.views.view_filling import Shown, chart, grouped, table, value
@@ -100,28 +100,51 @@ def stored_runs(reports: Path) -> tuple[Seen, ...]:
 
 
 def _read(folder: Path) -> Seen | None:
-    """None for what is no run: a comparison, a summary, a study."""
+    """A run with its predictions, where it may count; None for what is no run: a comparison, a
+    summary, a study."""
     try:
         table = stored_table(folder, part=("check", "check.*"))
-        return _seen(folder.name, table) if table.of_run else None
+        if not table.of_run:
+            return None
+        head, why = table.head, _unfit(table.head)
+        if why:
+            return Seen(folder.name, why, head["kind"])
+        inputs = sorted(i["sha256"] or i["path"] for i in head["inputs"])
+        changed = sorted(
+            f"{c['path']}={c['value']}"
+            for c in head.get("changed", [])
+            if c["path"].rpartition(".")[2] not in _LOCATES
+        )
+        run = Seen(
+            folder.name, "", head["kind"], head["created"], (head["experiment"], *inputs),
+            tuple(changed), tuple(head["domain"]),
+        )  # fmt: skip
+        # What the first accepted method predicted, and why its other checks, and those of other
+        # methods, do not count.
+        method = next(m["name"] for m in head["methods"] if m.get("accepted"))
+        specimen = ", ".join(sorted({d["specimen"] for d in run.domain}))
+        predicted: list[Foretold] = []
+        left: dict[str, int] = {}
+        for check in checks_of(table.rows):
+            other = check["method"] != method
+            why = "from another method on the same data" if other else _no_evidence(check)
+            if why:
+                left[why] = left.get(why, 0) + 1
+                continue
+            size = check["size"]
+            # Many thousand predictions share their texts.
+            name, kind, unit = (sys.intern(check[k]) for k in ("name", "kind", "unit"))
+            predicted.append(Foretold(
+                (run.folder,), run.recorded[0], sys.intern(method), name, kind, unit, specimen,
+                size["measured"], size["simulated"], size["u"], check["value"], check["u_val"],
+                float(np.hypot(check["u_num"], check["u_input"])), check["u_D"],
+                sys.intern(check["verdict"]), run.changed,
+            ))  # fmt: skip
+        return replace(run, predicted=tuple(predicted), left=left)
     except RecordingError as error:
         return Seen(folder.name, str(error))
     except (KeyError, TypeError, AttributeError) as error:
         return Seen(folder.name, f"its results cannot be read: {error!r:.60}")
-
-
-def _seen(folder: str, table: LongTable) -> Seen:
-    """A run with its predictions, where it may count."""
-    head, why = table.head, _unfit(table.head)
-    if why:
-        return Seen(folder, why, head["kind"])
-    inputs = sorted(i["sha256"] or i["path"] for i in head["inputs"])
-    run = Seen(
-        folder, "", head["kind"], head["created"], (head["experiment"], *inputs), _changed(head),
-        tuple(head["domain"]),
-    )  # fmt: skip
-    predicted, left = _predicted(run, table)
-    return replace(run, predicted=predicted, left=left)
 
 
 def _unfit(content: Json) -> str:
@@ -146,14 +169,6 @@ def _standing(run: Seen) -> tuple[int, list[int]]:
     return len(run.changed), [-ord(c) for c in run.created]
 
 
-def _changed(head: Json) -> tuple[str, ...]:
-    return tuple(sorted(
-        f"{c['path']}={c['value']}"
-        for c in head.get("changed", [])
-        if c["path"].rpartition(".")[2] not in _LOCATES
-    ))  # fmt: skip
-
-
 def predictions(runs: Iterable[Seen]) -> tuple[tuple[Foretold, ...], dict[str, int]]:
     """What the runs that count predicted, repeats as one; and how many checks do not count, by the
     reason."""
@@ -166,22 +181,6 @@ def predictions(runs: Iterable[Seen]) -> tuple[tuple[Foretold, ...], dict[str, i
     found.sort(key=lambda p: p.key)
     repeats = [list(group) for _, group in groupby(found, key=lambda p: p.key)]
     return tuple(_mean(group) for group in repeats), left
-
-
-def _predicted(run: Seen, table: LongTable) -> tuple[tuple[Foretold, ...], dict[str, int]]:
-    """What the first accepted method predicted, and why its other checks, and those of other
-    methods, do not count."""
-    method = next(m["name"] for m in table.head["methods"] if m.get("accepted"))
-    found: list[Foretold] = []
-    left: dict[str, int] = {}
-    for check in checks_of(table.rows):
-        other = check["method"] != method
-        why = "from another method on the same data" if other else _no_evidence(check)
-        if why:
-            left[why] = left.get(why, 0) + 1
-        else:
-            found.append(_prediction(run, check))
-    return tuple(found), left
 
 
 def _no_evidence(check: Json) -> str:
@@ -199,19 +198,6 @@ def _no_evidence(check: Json) -> str:
     if check["size"]["u"] > _ROUGH * check["size"]["measured"]:
         return f"measured with an uncertainty above {100 * _ROUGH:g} %"
     return ""
-
-
-def _prediction(run: Seen, check: Json) -> Foretold:
-    size, experiment = check["size"], run.recorded[0]
-    specimen = ", ".join(sorted({d["specimen"] for d in run.domain}))
-    # Many thousand predictions share their texts.
-    method, name, kind, unit = (sys.intern(check[k]) for k in ("method", "name", "kind", "unit"))
-    return Foretold(
-        (run.folder,), experiment, method, name, kind, unit, specimen,
-        size["measured"], size["simulated"], size["u"], check["value"], check["u_val"],
-        float(np.hypot(check["u_num"], check["u_input"])), check["u_D"],
-        sys.intern(check["verdict"]), run.changed,
-    )  # fmt: skip
 
 
 def _mean(group: list[Foretold]) -> Foretold:
@@ -362,13 +348,25 @@ def write_summary(found: Summary, folder: Path) -> Path:
         sentence(found),
     )  # fmt: skip
     points, all_points = _points("predictions", found.kinds)
-    runs, all_runs = _runs(found)
+    columns: Mapping[str, Shown] = {
+        "run": "folder", "counts": lambda r: "does not count" if r.why else "counts", "why": "why",
+    }  # fmt: skip
+    all_runs = table("runs", "Below one folder of reports.", found.runs, columns, below="why")
+    note = _more("runs", len(all_runs.rows), "first")
+    runs = replace(all_runs, name="", rows=all_runs.rows[:_ROWS], note=note)
+    # Twins in tables of their own.
+    twins: tuple[Exhibit, ...] = ()
+    if found.twins:
+        words = ("Recordings made by our finer models; they are not measurements.",)
+        page, data = _points("twin_predictions", found.twins)
+        tables = (_table("twins", found.twins), page)
+        twins = (Exhibit("twins", "Twins", words, tables, data=(data,)),)
     left = tuple(f"{_count(number, 'check')} of these runs not counted: {why}."
                  for why, number in found.left.items())  # fmt: skip
     exhibits = (
         Exhibit("statement", "Measured recordings", _WORDS, (_table("statement", found.kinds),),
                 tuple(starmap(_against, enumerate(found.kinds, 1)))),
-        *_twins(found),
+        *twins,
         Exhibit("predictions", "Predictions that count", tables=(points,), data=(all_points,)),
         Exhibit("runs", "Counted and excluded runs", left, (runs,),
                 data=(all_runs,)),
@@ -484,16 +482,6 @@ def _band(label: str, x: Floats, by: float, sd: float) -> Iterator[Series]:
     yield Series(label, x, by * x)
 
 
-def _twins(found: Summary) -> tuple[Exhibit, ...]:
-    """What twins say, in tables of their own; nothing without one."""
-    if not found.twins:
-        return ()
-    words = ("Recordings made by our finer models; they are not measurements.",)
-    page, data = _points("twin_predictions", found.twins)
-    tables = (_table("twins", found.twins), page)
-    return (Exhibit("twins", "Twins", words, tables, data=(data,)),)
-
-
 def _points(name: str, kinds: tuple[OfKind, ...]) -> tuple[NumberTable, NumberTable]:
     """Predictions for the page, those with the largest errors, and all of them for the files."""
     points = [p for k in kinds for p in k.points]
@@ -535,15 +523,6 @@ def _more(name: str, count: int, which: str) -> str:
     if not count:
         return "None."
     return f"The {which} {_ROWS} of {count}: tables/{name}.csv has all." if count > _ROWS else ""
-
-
-def _runs(found: Summary) -> tuple[NumberTable, NumberTable]:
-    columns: Mapping[str, Shown] = {
-        "run": "folder", "counts": lambda r: "does not count" if r.why else "counts", "why": "why",
-    }  # fmt: skip
-    runs = table("runs", "Below one folder of reports.", found.runs, columns, below="why")
-    note = _more("runs", len(runs.rows), "first")
-    return replace(runs, name="", rows=runs.rows[:_ROWS], note=note), runs
 
 
 def document(found: Summary, *, predictions: bool = True) -> dict[str, Any]:

@@ -6,7 +6,7 @@ those of their quarrel over memory.
 
 import platform
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -53,8 +53,18 @@ def held_bytes(thing: Any) -> int:
             total += one.nbytes
         elif isinstance(one, SuperLU):
             total += _OF_A_FACTOR * int(one.nnz)
-        else:
-            left += _inside(one)
+        elif isinstance(one, Mapping):
+            left += one.values()
+        elif isinstance(one, (tuple, list)):
+            left += one
+        elif sparse.issparse(one):
+            names = ("data", "indices", "indptr", "offsets")
+            left += [getattr(one, n) for n in names if hasattr(one, n)]
+        elif is_dataclass(one) and not isinstance(one, type):
+            left += [getattr(one, f.name) for f in fields(one)]
+            left += getattr(one, "__dict__", {}).values()  # cached properties too
+        elif (type(one).__module__ or "").startswith("validate") and hasattr(one, "__dict__"):
+            left += vars(one).values()
     return total
 
 
@@ -62,26 +72,6 @@ def _owner(array: np.ndarray) -> np.ndarray:
     """The array whose memory a view shows."""
     base = array.base
     return _owner(base) if isinstance(base, np.ndarray) else array
-
-
-def _inside(one: Any) -> Iterable[Any]:
-    if isinstance(one, Mapping):
-        return list(one.values())
-    if isinstance(one, (tuple, list)):
-        return list(one)
-    if sparse.issparse(one):
-        return [
-            getattr(one, n) for n in ("data", "indices", "indptr", "offsets") if hasattr(one, n)
-        ]
-    if is_dataclass(one) and not isinstance(one, type):
-        own = [getattr(one, f.name) for f in fields(one)]
-        return own + list(getattr(one, "__dict__", {}).values())  # cached properties too
-    module = type(one).__module__ or ""
-    return (
-        list(vars(one).values())
-        if module.startswith("validate") and hasattr(one, "__dict__")
-        else []
-    )
 
 
 # --- External simulators on the ladder of a trade-off: each run is a separate process.
@@ -315,9 +305,15 @@ def _stride(
     # Matrices that were asked for, of K, M and C (with the lumped masses)
     made = [name for name in ("K", "M", "C", "masses") if name in system.__dict__]
     assembled = " ".join("m" if name == "masses" else name for name in made) or "none"
+    # Median seconds of forming all displacements of a state
+    state, seconds = stepper.step(stepper.rest(), warmed), list[float]()
+    for _ in range(0 if state.failure else _FIELDS):
+        began = perf_counter()
+        stepper.field(state)
+        seconds.append(perf_counter() - began)
+    field_s = float(np.median(seconds)) if seconds else 0.0
     stride = Stride(
-        dt, None, len(system.free), setup, None, _field_seconds(stepper, warmed),
-        held_bytes(stepper), assembled,
+        dt, None, len(system.free), setup, None, field_s, held_bytes(stepper), assembled,
     )  # fmt: skip
     if not tried.finished:
         return replace(stride, failed=f"{tried.outcome.state}: {tried.outcome.why}")
@@ -331,16 +327,3 @@ def _stride(
         why = f"{run.outcome.state} at step {run.outcome.step + 1}: {run.outcome.why}"
         return replace(stride, failed=why)
     return _answered(replace(stride, step=run.step_s), trial, system, run)
-
-
-def _field_seconds(stepper: Stepper, inputs: Floats) -> float:
-    """Median seconds of forming all displacements of a state."""
-    state = stepper.step(stepper.rest(), inputs)
-    if state.failure:
-        return 0.0
-    seconds = []
-    for _ in range(_FIELDS):
-        start = perf_counter()
-        stepper.field(state)
-        seconds.append(perf_counter() - start)
-    return float(np.median(seconds))

@@ -1,7 +1,7 @@
 """Report of a trade-off: front, parts of each error, set-up, memory, convergence, failures."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import groupby
 
 from validate.compare.exhibit import Chart, Exhibit, NumberTable
@@ -28,11 +28,35 @@ _TIMES = (
 
 def trade_exhibits(trade: Trade) -> tuple[Exhibit, ...]:
     """In the order of a reader's questions."""
-    found = [_front_exhibit(trade), _shares(trade), _costs(trade), _convergence(trade)]
+    columns: Mapping[str, Shown] = {
+        **_CASE, "unknowns": "unknowns", "set-up / ms": "setup_s", "assembled": "assembled",
+        "p50 / us": "step.p50", "p99 / us": "step.p99", "max / us": "step.max",
+        "steps timed": "step.n", "field / us": "field_s",
+        "memory / MB": lambda r: _MB * r.memory,
+    }  # fmt: skip
+    shortest = {(r.solver.name, r.element, r.level): r
+                for r in trade.rows if r.step is not None}  # fmt: skip
+    of_costs = (
+        "Set-up is from the scene to the first step, at the first of the solver's steps. "
+        "Matrices are assembled at first use: K stiffness, M mass, C damping, m lumped "
+        "masses. A solver without inertia has no mass matrix; an explicit one at large strain "
+        "has no K.",
+        f"Memory: {DEFINITION}.",
+    )
+    note = "One step of every solver, element and mesh; cells.csv has all."
+    times = table("costs", "Set-up, time per step, memory", shortest.values(), columns, note)
+    costs = Exhibit("costs", "Set-up, steps and memory", of_costs, (times,))
+    found = [_front_exhibit(trade), _shares(trade), costs, _convergence(trade)]
     if (sizes := regions_exhibit(trade)) is not None:
         found.insert(1, sizes)
-    rest = [r for r in trade.rows if r.failed]
-    return (*found, *((_failures(rest),) if rest else ()))
+    if rest := [r for r in trade.rows if r.failed]:
+        title = "Cells without an error"
+        words = (
+            f"{len(rest)} cells were refused, ended early or were only timed. All are listed.",
+        )
+        failed = table("unscored", title, rest, {**_CASE, "why": "failed"})
+        found.append(Exhibit("unscored", title, words, (failed,)))
+    return tuple(found)
 
 
 def dominant(row: TradeRow, trade: Trade) -> str:
@@ -51,13 +75,21 @@ def dominant(row: TradeRow, trade: Trade) -> str:
 
 def _front_exhibit(trade: Trade) -> Exhibit:
     scene = trade.trial
+    law = f"The effect of large strain is not known: {trade.law_words}."
+    if trade.law_error is not None:
+        law = (
+            f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes "
+            f"the answer by {trade.shown(trade.law_error)} rms. The second front adds that "
+            "difference to the reference, so linear and large-strain solvers are compared with "
+            "one truth."
+        )
     words = [
         f"Error: {ERRORS[trade.unit]}. {len(scene.points)} points, {len(scene.frames)} frames; "
         f"the reference ({scene.reference[0]} mesh {scene.reference[1]}, no solver error) "
         f"{'moves' if trade.unit == 'm' else 'has'} {trade.shown(trade.moved, 4)} rms and has "
         f"an error of about {trade.shown(trade.floor, 2)} (Richardson): smaller errors count "
         "as equal.",
-        _law_words(trade),
+        law,
         _TIMES,
     ]
     for by in _NAMES:
@@ -74,17 +106,6 @@ def _front_exhibit(trade: Trade) -> Exhibit:
         tables=tuple(_front_table(f, trade) for f in fronts),
         charts=tuple(_front_chart(f, trade) for f in fronts),
     )  # fmt: skip
-
-
-def _law_words(trade: Trade) -> str:
-    if trade.law_error is None:
-        return f"The effect of large strain is not known: {trade.law_words}."
-    return (
-        f"Fronts of the linear law. On a coarse pair ({trade.law_words}) large strain changes "
-        f"the answer by {trade.shown(trade.law_error)} rms. The second front adds that "
-        "difference to the reference, so linear and large-strain solvers are compared with "
-        "one truth."
-    )
 
 
 def _shares_of(trade: Trade) -> Mapping[str, Shown]:
@@ -156,45 +177,21 @@ def _shares(trade: Trade) -> Exhibit:
         if row.error is not None and (key not in best or row.error < (best[key].error or 0.0)):
             best[key] = row
     least = table("shares", "Components of each error", list(best.values()), columns, note)
-    return Exhibit("shares", "Mesh error and solver error", words, (least,), (_mesh_chart(trade),))
-
-
-def _mesh_chart(trade: Trade) -> Chart:
-    """Mesh error over the cells' size, one line an element."""
+    # Mesh error over the cells' size, one line an element
     lines = {}
     for element, levels in trade.trial.meshes.items():
         by_level = {r.level: r for r in trade.rows if r.element == element and r.mesh_error}
         lines[element] = [by_level[level] for level in levels if level in by_level]
-    return chart(
+    meshes = chart(
         "mesh_error", "Mesh error against cell size",
         ("cell size / mm", lambda r: trade.trial.size(r.level)),
         (f"mesh's share / {trade.shown_unit}", "mesh_error"), lines=lines,
         levels={"error of the reference": trade.floor} | _law_level(trade), log="xy",
     )  # fmt: skip
+    return Exhibit("shares", "Mesh error and solver error", words, (least,), (meshes,))
 
 
 # --- set-up, steps, memory -----------------------------------------------------------------------
-
-
-def _costs(trade: Trade) -> Exhibit:
-    columns: Mapping[str, Shown] = {
-        **_CASE, "unknowns": "unknowns", "set-up / ms": "setup_s", "assembled": "assembled",
-        "p50 / us": "step.p50", "p99 / us": "step.p99", "max / us": "step.max",
-        "steps timed": "step.n", "field / us": "field_s",
-        "memory / MB": lambda r: _MB * r.memory,
-    }  # fmt: skip
-    shortest = {(r.solver.name, r.element, r.level): r
-                for r in trade.rows if r.step is not None}  # fmt: skip
-    words = (
-        "Set-up is from the scene to the first step, at the first of the solver's steps. "
-        "Matrices are assembled at first use: K stiffness, M mass, C damping, m lumped "
-        "masses. A solver without inertia has no mass matrix; an explicit one at large strain "
-        "has no K.",
-        f"Memory: {DEFINITION}.",
-    )
-    note = "One step of every solver, element and mesh; cells.csv has all."
-    costs = table("costs", "Set-up, time per step, memory", shortest.values(), columns, note)
-    return Exhibit("costs", "Set-up, steps and memory", words, (costs,))
 
 
 # --- convergence ---------------------------------------------------------------------------------
@@ -209,42 +206,32 @@ def _convergence(trade: Trade) -> Exhibit:
         f"Richardson's error / {unit}": "found.error", f"index (GCI) / {unit}": "found.index",
         f"GCI of the {whole} / %": lambda x: x.found.index / trade.moved,
     }  # fmt: skip
+    # The meshes' and the steps' estimates at the finest level of each ladder.
+    meshes = [x.found.error for x in trade.refinements if x.unit == "m"]
+    steps = [x.found.error for x in trade.refinements if x.unit == "s"]
+    compared = "The scene has no time steps: only meshes can be refined."
+    if meshes and steps:
+        first = "mesh" if max(meshes) > max(steps) else "step"
+        compared = (
+            "At the finest level of each ladder the error of the mesh is "
+            f"{trade.shown(min(meshes), 2)} to {trade.shown(max(meshes), 2)}, that of the time "
+            f"step {trade.shown(min(steps), 2)} to {trade.shown(max(steps), 2)}: refine the "
+            f"{first} first."
+        )
     words = (
         "For the finest solution of each ladder: the observed order from three solutions, "
         "Richardson's estimate of its error, and the grid convergence index. The index is "
         "1.25 times that estimate if the observed order is plausible, else 3 times (Roache "
         "1994; Celik et al. 2008). Two solutions have no observed order: the theoretical one "
         "is used. Steps are refined on one mesh.",
-        _compared(trade),
+        compared,
     )
     orders = table("convergence", "Discretisation error", trade.refinements, columns)
     return Exhibit("convergence", "Observed order and grid convergence index", words, (orders,))
 
 
-def _compared(trade: Trade) -> str:
-    """The meshes' largest and the steps' largest estimate side by side."""
-    meshes = [x.found.error for x in trade.refinements if x.unit == "m"]
-    steps = [x.found.error for x in trade.refinements if x.unit == "s"]
-    if not (meshes and steps):
-        return "The scene has no time steps: only meshes can be refined."
-    first = "mesh" if max(meshes) > max(steps) else "step"
-    return (
-        "At the finest level of each ladder the error of the mesh is "
-        f"{trade.shown(min(meshes), 2)} to {trade.shown(max(meshes), 2)}, that of the time "
-        f"step {trade.shown(min(steps), 2)} to {trade.shown(max(steps), 2)}: refine the "
-        f"{first} first."
-    )
-
-
 def _sizes(x: Refinement) -> str:
     return f"{', '.join(f'{1e3 * s:.3g}' for s in x.sizes)} m{x.unit}"
-
-
-def _failures(rows: Sequence[TradeRow]) -> Exhibit:
-    title = "Cells without an error"
-    words = (f"{len(rows)} cells were refused, ended early or were only timed. All are listed.",)
-    failed = table("unscored", title, rows, {**_CASE, "why": "failed"})
-    return Exhibit("unscored", title, words, (failed,))
 
 
 # --- regions --------------------------------------------------------------------------------------
@@ -273,32 +260,28 @@ def pays(trade: Trade) -> Iterator[str]:
     if not any(r.solver.rung == "regions" for r in rows):
         return
     for _, mine in groupby(rows, key=lambda r: (r.element, r.level)):
-        if words := _of_size(list(mine)):
-            yield words
+        of_size = list(mine)
+        regions = _fastest(of_size, "regions")
+        whole, reduced = _fastest(of_size, "prefactored"), _fastest(of_size, "modal")
+        if regions is None or whole is None or not (regions.step and whole.step):
+            continue
+        faster = "faster" if SAME_TIME * regions.step.p50 < whole.step.p50 else "not faster"
+        holds = "shorter" if SAME_TIME * regions.step.p99 < whole.step.p99 else "not shorter"
+        modal = ""
+        if reduced is not None and reduced.step is not None:
+            modal = f"; '{reduced.solver.name}' takes {_MS * reduced.step.p50:.3g} ms"
+        yield (
+            f"{of_size[0].unknowns} unknowns: regions ({regions.solver.name}) are {faster} than "
+            f"the whole solve in the median ({_MS * regions.step.p50:.3g} for "
+            f"{_MS * whole.step.p50:.3g} ms) and {holds} in slow steps "
+            f"({_MS * regions.step.p99:.3g} for {_MS * whole.step.p99:.3g} ms){modal}."
+        )
     yield (
         "Regions are slow in the steps in which far regions are also solved; a deadline must "
         "allow for them. (A busy machine lengthens the slow steps of every method.) A reduced "
         "model is valid for a linear body whose contact does not move. Regions are useful "
         "where matrices change at every step, or where another machine solves the far region."
     )
-
-
-def _of_size(rows: list[TradeRow]) -> str:
-    """Whole, fastest regions and reduced model of one mesh."""
-    regions = _fastest(rows, "regions")
-    whole, reduced = _fastest(rows, "prefactored"), _fastest(rows, "modal")
-    if regions is None or whole is None or not (regions.step and whole.step):
-        return ""
-    faster = "faster" if SAME_TIME * regions.step.p50 < whole.step.p50 else "not faster"
-    holds = "shorter" if SAME_TIME * regions.step.p99 < whole.step.p99 else "not shorter"
-    words = (
-        f"{rows[0].unknowns} unknowns: regions ({regions.solver.name}) are {faster} than the whole "
-        f"solve in the median ({_MS * regions.step.p50:.3g} for {_MS * whole.step.p50:.3g} ms) and "
-        f"{holds} in slow steps ({_MS * regions.step.p99:.3g} for {_MS * whole.step.p99:.3g} ms)"
-    )
-    if reduced is None or reduced.step is None:
-        return f"{words}."
-    return f"{words}; '{reduced.solver.name}' takes {_MS * reduced.step.p50:.3g} ms."
 
 
 def _fastest(rows: list[TradeRow], rung: str) -> TradeRow | None:

@@ -25,8 +25,27 @@ def told(trade: Trade) -> Findings:
 
 
 def told_choice(choice: Choice) -> Findings:
-    trade = choice.trade
-    document = {"kind": "choose", **_choice_document(choice), **trade_document(trade)}
+    trade, want = choice.trade, choice.wanted
+    document = {
+        "kind": "choose",
+        "wanted": {_in_unit("error_m", trade): want.error, "rate_hz": want.rate, "by": choice.by},
+        "verdict": list(words(choice)),
+        "pick": _named(choice.pick, choice),
+        "at_every_tick": _named(choice.confirmed, choice),
+        "nearest": _named(choice.nearest, choice),
+        "numbers": [members(f) for f in choice.facts],
+        "ladder": [
+            {"rung": c.rung, "verdict": c.verdict, "cells": c.run, "scored": c.scored,
+             "evidence": c.evidence, "best": _named(c.best, choice)}
+            for c in choice.ladder
+        ],
+        "excluded": [
+            {"rung": e.rung, "candidate": e.candidate, "bound_s": e.bound, "pick_s": e.pick,
+             "why": e.why}
+            for e in choice.excluded
+        ],
+        **trade_document(trade),
+    }  # fmt: skip
     return Findings(
         f"Choice: {trade.experiment.title}", next(words(choice)), choose_exhibits(choice),
         document, cells_table(trade), trade.quick,
@@ -95,29 +114,6 @@ def _refinement(x: Refinement, trade: Trade) -> dict[str, Any]:
         _in_unit("differences_m", trade): list(f.differences),
         _in_unit("richardson_error_m", trade): f.error,
         _in_unit("gci_m", trade): f.index,
-    }  # fmt: skip
-
-
-def _choice_document(choice: Choice) -> dict[str, Any]:
-    want = choice.wanted
-    return {
-        "wanted": {_in_unit("error_m", choice.trade): want.error, "rate_hz": want.rate,
-                   "by": choice.by},
-        "verdict": list(words(choice)),
-        "pick": _named(choice.pick, choice),
-        "at_every_tick": _named(choice.confirmed, choice),
-        "nearest": _named(choice.nearest, choice),
-        "numbers": [members(f) for f in choice.facts],
-        "ladder": [
-            {"rung": c.rung, "verdict": c.verdict, "cells": c.run, "scored": c.scored,
-             "evidence": c.evidence, "best": _named(c.best, choice)}
-            for c in choice.ladder
-        ],
-        "excluded": [
-            {"rung": e.rung, "candidate": e.candidate, "bound_s": e.bound, "pick_s": e.pick,
-             "why": e.why}
-            for e in choice.excluded
-        ],
     }  # fmt: skip
 
 

@@ -294,7 +294,17 @@ def traded(
         why = next(r.why for c, r in records if c.part == "best")
         why = why or f"the reference solver has no number in {unit}"
         raise ComparisonError(f"no reference, so nothing was compared: {why}")
-    gap, words = _law_gap(trial, {c.part: r for c, r in records}, unit)
+    # What large strain changes, at frames and points: the pair's difference, and on what.
+    gap, words = None, "the ladder has no pair of laws"
+    if (pair := trial.pair) is not None:
+        of_part = {c.part: r for c, r in records}
+        linear, large = (_answer(of_part[part], unit) for part in ("declared", "large"))
+        if linear is None or large is None:
+            why = of_part["large"].why or of_part["declared"].why
+            words = why or f"the pair of laws has no number in {unit}"
+        else:
+            gap = large - linear
+            words = f"{pair.element} mesh {pair.level}, steps of {pair.dt:.3g} s"
     solved = [(c, r) for c, r in records if c.part == "solver"]
     rows = tuple(row for c, r in solved for row in _rows(trial, c, r, answers, gap, unit))
     refinements = (*_over_meshes(trial, answers), *_over_steps(trial, solved, unit))
@@ -308,20 +318,6 @@ def _answer(record: Record[Measured], unit: ErrorUnit) -> Floats | None:
 def _found(stride: Stride, unit: ErrorUnit) -> Floats | None:
     """What a stride found of the quantity that is judged."""
     return {"m": stride.u, "N": stride.force, "Pa": stride.pressure}[unit]
-
-
-def _law_gap(
-    trial: Trial, records: Mapping[Part, Record[Measured]], unit: ErrorUnit
-) -> tuple[Floats | None, str]:
-    """What large strain changes, at frames and points: the pair's difference, and on what."""
-    p = trial.pair
-    if p is None:
-        return None, "the ladder has no pair of laws"
-    declared, large = (_answer(records[part], unit) for part in ("declared", "large"))
-    if declared is None or large is None:
-        why = records["large"].why or records["declared"].why
-        return None, why or f"the pair of laws has no number in {unit}"
-    return large - declared, f"{p.element} mesh {p.level}, steps of {p.dt:.3g} s"
 
 
 def _rows(
@@ -349,29 +345,20 @@ def _row(
 ) -> TradeRow:
     errors: dict[str, float | None] = {}
     failed = s.failed
-    if (found := _found(s, unit)) is not None:
-        errors = _errors(trial, cell, found, answers, gap)
+    if (u := _found(s, unit)) is not None:
+        reference, mesh = answers[trial.reference], answers.get((cell.element, cell.level))
+        total = None if gap is None else rms(u - reference - gap)
+        mesh_error = None if mesh is None else rms(mesh - reference)
+        errors = {"error": total, "total": total, "mesh_error": mesh_error}
+        if trial.solver(cell.solver).law == "linear":
+            errors["error"] = rms(u - reference)
+            errors["solver_error"] = None if mesh is None else rms(u - mesh)
     elif s.u is not None:
         failed = f"the solver has no number in {unit}"
     return TradeRow(
         trial.solver(cell.solver), cell.element, cell.level, s.dt, s.unknowns, s.setup_s, s.step,
         s.field_s, s.memory, s.assembled, failed=failed, **errors,
     )  # fmt: skip
-
-
-def _errors(
-    trial: Trial, cell: TradeCell, u: Floats, answers: Answers, gap: Floats | None
-) -> dict[str, float | None]:
-    reference, mesh = answers[trial.reference], answers.get((cell.element, cell.level))
-    total = None if gap is None else rms(u - reference - gap)
-    mesh_error = None if mesh is None else rms(mesh - reference)
-    if trial.solver(cell.solver).law != "linear":
-        return {"error": total, "total": total, "mesh_error": mesh_error}
-    solver_error = None if mesh is None else rms(u - mesh)
-    return {
-        "error": rms(u - reference), "total": total, "mesh_error": mesh_error,
-        "solver_error": solver_error,
-    }  # fmt: skip
 
 
 def _over_meshes(trial: Trial, answers: Answers) -> Iterator[Refinement]:
