@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from validate.arrays import Floats
 from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Markers
-from validate.register.outlines.image_plane import SurfaceSampler
+from validate.register.outlines.sections import SurfaceSampler
 from validate.scene.mesh import Mesh
 
 

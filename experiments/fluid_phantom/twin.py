@@ -14,7 +14,7 @@ from validate.arrays import Floats
 from validate.fem.system import build
 from validate.parameters import quantity
 from validate.recording.types import Contours, Frames, Recording, Signal, Source
-from validate.register.outlines.image_plane import SurfaceSampler
+from validate.register.outlines.sections import SurfaceSampler
 from validate.scene.geometries.inclusion import Block, Capsule
 from validate.scene.material import LawName, Material
 from validate.scene.scene import Scene

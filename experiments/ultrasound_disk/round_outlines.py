@@ -10,7 +10,7 @@ from validate.arrays import Floats
 from validate.fem.assembly.locate import Rows
 from validate.recording.types import Contours, Frames
 from validate.register.observation import AnyDraw, Deviation, Role, Selection, Simulated
-from validate.register.outlines.image_plane import Circle
+from validate.register.outlines.sections import Circle
 
 ENDS = ("left", "right")  # two points of the body, a diameter apart
 

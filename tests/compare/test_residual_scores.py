@@ -20,8 +20,8 @@ from validate.errors import ComparisonError
 from validate.fem.assembly.locate import nearest_node_rows
 from validate.register.markers.markers import MarkerObservation, Together
 from validate.register.observation import Selection
-from validate.register.outlines.image_plane import SurfaceSampler
 from validate.register.outlines.outlines import Corner, OutlineObservation
+from validate.register.outlines.sections import SurfaceSampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.solve.fluid.cavities import ExactPressure

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from validate.errors import RegistrationError
 from validate.recording.types import Contours
-from validate.register.outlines.image_plane import Circle, outlined_capsule
+from validate.register.outlines.sections import Circle, outlined_capsule
 
 
 def circle(centre, radius, k, first=0.0):

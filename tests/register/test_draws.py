@@ -30,13 +30,13 @@ from validate.register.observation import (
     from_rest,
     shifted,
 )
-from validate.register.outlines.image_plane import section
 from validate.register.outlines.outlines import (
     OutlineObservation,
     normals,
     polar_angles,
     ray_points,
 )
+from validate.register.outlines.sections import section
 from validate.register.signals import SignalObservation
 from validate.register.tools.landmarks import Digitised, Dwell, Match
 from validate.scene.geometries.box import box

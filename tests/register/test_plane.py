@@ -6,7 +6,7 @@ from phantoms import CAPSULE, PAPER_GRID, grid_mesh, phantom_mesh
 from scipy.spatial.transform import Rotation
 
 from validate.errors import RegistrationError
-from validate.register.outlines.image_plane import (
+from validate.register.outlines.sections import (
     SurfaceSampler,
     from_image,
     require_rigid,

@@ -31,8 +31,8 @@ from validate.installation import install_command
 from validate.recording.mcap.read import read_recording
 from validate.recording.preflight import Inspection
 from validate.recording.types import Frames
-from validate.register.outlines.image_plane import from_image
 from validate.register.outlines.outlines import normal_distances
+from validate.register.outlines.sections import from_image
 from validate.report.replay import mcap as replay_mcap
 from validate.report.replay import space as replay_signals
 from validate.report.replay.mcap import tracks, views, write_replay

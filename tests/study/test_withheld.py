@@ -18,8 +18,8 @@ from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.experiment.options import Options
 from validate.pipeline.run.pipeline import compare
 from validate.recording.types import Contours
-from validate.register.outlines.image_plane import SurfaceSampler
 from validate.register.outlines.outlines import OutlineObservation
+from validate.register.outlines.sections import SurfaceSampler
 from validate.scene.geometries.box import box
 from validate.study.filters.cell import folds_of, run_cell
 from validate.study.filters.page import against_first, study_exhibits

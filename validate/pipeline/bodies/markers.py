@@ -17,8 +17,8 @@ from validate.register.markers.markers import MarkerObservation, vector
 from validate.register.markers.measures import FEWEST
 from validate.register.markers.quality import MarkerFit, as_declared
 from validate.register.observation import nearest_sample
-from validate.register.outlines.image_plane import SurfaceSampler, section
 from validate.register.outlines.outlines import OutlineObservation, enclosed
+from validate.register.outlines.sections import SurfaceSampler, section
 from validate.scene.mesh import Mesh
 from validate.scene.places import pose_of
 from validate.scene.scene import Scene

@@ -26,8 +26,8 @@ from validate.register.clocks import clock_sd
 from validate.register.markers.markers import MarkerObservation, Sampling, Together
 from validate.register.markers.quality import MarkerFit
 from validate.register.observation import nearest_sample
-from validate.register.outlines.image_plane import SurfaceSampler, outlined_capsule
 from validate.register.outlines.outlines import Corner, OutlineObservation
+from validate.register.outlines.sections import SurfaceSampler, outlined_capsule
 from validate.register.outlines.sweep import Stack, stacked, surface_of, sweep_outlines
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation, holds_at, instant, require_rising

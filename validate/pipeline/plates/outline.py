@@ -18,8 +18,8 @@ from validate.pipeline.experiment.tree import Tree
 from validate.recording.types import Contours, Recording
 from validate.register.clocks import clock_sd
 from validate.register.observation import Selection, nearest_samples
-from validate.register.outlines.image_plane import SurfaceSampler
 from validate.register.outlines.outlines import OutlineObservation, enclosed
+from validate.register.outlines.sections import SurfaceSampler
 from validate.register.registration import Registered
 from validate.register.signals import SignalObservation
 from validate.scene.geometries.specification import Cylinder

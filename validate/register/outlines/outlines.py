@@ -25,7 +25,7 @@ from validate.register.observation import (
     frame_at,
     nearest_sample,
 )
-from validate.register.outlines.image_plane import SurfaceSampler, from_image, require_rigid
+from validate.register.outlines.sections import SurfaceSampler, from_image, require_rigid
 
 _TURN = 2 * np.pi
 EVERY_TEN = np.deg2rad(np.arange(0.0, 360.0, 10.0))  # rad

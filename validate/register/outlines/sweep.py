@@ -16,7 +16,7 @@ from validate.arrays import Floats, checked, rms
 from validate.errors import RecordingError, RegistrationError
 from validate.recording.outlines.outline import Outline, extract_outline
 from validate.recording.types import Contours, Frames
-from validate.register.outlines.image_plane import require_rigid
+from validate.register.outlines.sections import require_rigid
 from validate.scene.geometries.inclusion import SlicedShape
 
 _ANGLES = 72

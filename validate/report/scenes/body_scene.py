@@ -16,7 +16,7 @@ from validate.fem.assembly.locate import probe_rows
 from validate.numbers import significant, spaced, with_unit
 from validate.register.clocks import interpolated
 from validate.register.markers.displacements import DisplacementObservation
-from validate.register.outlines.image_plane import from_image
+from validate.register.outlines.sections import from_image
 from validate.register.registration import Registered
 from validate.report.scenes.body import (
     Camera,

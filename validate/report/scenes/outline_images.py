@@ -15,7 +15,7 @@ from validate.errors import RegistrationError
 from validate.numbers import spaced, with_unit
 from validate.recording.types import Contours, Frames, Recording
 from validate.register.observation import nearest_sample
-from validate.register.outlines.image_plane import Circle
+from validate.register.outlines.sections import Circle
 from validate.report.charts.style import WIDTH, draw, legend_below
 from validate.report.sections.observations import Held
 
