@@ -104,6 +104,18 @@ def test_the_recording_floor_knows_no_phantom(project_root: Path) -> None:
         assert not [word for word in words if word in text], path.name
 
 
+def test_a_heading_within_a_module_has_something_below_it(project_root: Path) -> None:
+    """Two headings in a row, or one at the end, are what a merge or a deletion left."""
+    empty = re.compile(r"^# ---[^\n]*\n(?:#(?! ---)[^\n]*\n)*\n*(?:# ---|\Z)", re.MULTILINE)
+    found = [
+        str(path.relative_to(project_root))
+        for folder in ("validate", "experiments", "tests")
+        for path in sorted((project_root / folder).rglob("*.py"))
+        if empty.search(path.read_text("utf-8"))
+    ]
+    assert found == []
+
+
 def test_no_module_imports_itself_by_a_detour(project_root: Path) -> None:
     """Imports inside functions count: what waits for its call is an arrow all the same."""
     files = {

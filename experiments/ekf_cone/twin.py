@@ -85,7 +85,7 @@ class LoadTable:
 
 def record_cone(cone: Cone, settings: ConeTwin, progress: Callable[[str], None]) -> Recording:
     """The recording: "markers", "stage" m (crosshead), "load_cell" N; records beside the tracker's:
-    "specimen" and "machine". Its displacements stand in a camera's frame: `register.placed`.
+    "specimen" and "machine". Its displacements stand in a camera's frame.
 
     Raises `SceneError` where the cone has no static solution up to `force`.
     """

@@ -3,8 +3,8 @@
 When exactly the hand let go lies between two samples and takes some milliseconds. Every run is
 therefore compared from the release that fits it best, one number for all markers, searched to
 `_REACH` about the last sample at rest; all else is as it was measured. Frequency and damping are
-those of the mean vertical motion, found in run and measurement in the same way (`identify.ringing`)
-and no matter of that shift.
+those of the mean vertical motion, found in run and measurement in the same way
+(`identify.recorded_motion`) and no matter of that shift.
 """
 
 from collections.abc import Mapping

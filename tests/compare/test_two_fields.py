@@ -13,7 +13,7 @@ from validate.compare.score import Metric
 from validate.compare.shapes.pair import Common, Field, FieldPair, pair
 from validate.compare.shapes.shape_error import BOUNDARY_METRICS
 from validate.compare.shapes.two_fields import METRICS_OF_FIELDS, FieldScores, compared
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.scene.geometries.box import box, grid
 from validate.scene.material import Material
 from validate.scene.mesh import Mesh
@@ -184,6 +184,12 @@ def test_the_common_mesh_assembles_once_over_many_frames() -> None:
 def test_units_of_metrics_have_the_dimension() -> None:
     assert [FieldScores.units(d)["E_i"] for d in (2, 3)] == ["m^2", "m^3"]
     assert FieldScores.units(2)["E_n"] == "1"
+
+
+def test_an_unknown_metric_is_refused_with_the_nearest() -> None:
+    run, reference, _ = on(box((1.0, 1.0), (2, 2)))
+    with pytest.raises(UsageError, match=r"no metric 'E_m'.*E_n"):
+        FieldScores.of(run, reference, metrics=("E_m",))
 
 
 def test_earlier_scores_stand_for_their_mesh() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from phantoms import CAPSULE, COARSE_GRID, grid_mesh, phantom_mesh
 
-from validate.errors import RegistrationError
+from validate.errors import RegistrationError, SceneError
 from validate.fem.assembly.locate import (
     Rows,
     facet_samples,
@@ -32,6 +32,13 @@ def inside(mesh: Mesh, k: int) -> np.ndarray:
     return np.einsum(
         "ka,kad->kd", L, mesh.nodes[mesh.corners[rng.integers(len(mesh.cells), size=k)]]
     )
+
+
+def test_points_that_are_none_are_refused() -> None:
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1))
+    for points, why in ((np.zeros(3), r"points.*\(3,\)"), (np.full((1, 3), np.nan), "not finite")):
+        with pytest.raises(SceneError, match=why):
+            Rows.barycentric(mesh, points)
 
 
 @orders

@@ -21,7 +21,7 @@ from validate.pipeline.experiment.options import Options, configure
 from validate.pipeline.experiment.tree import changed_by
 from validate.recording.mcap.write import write_recording
 from validate.recording.types import Recording, Signal, Source
-from validate.register.registration import as_declared
+from validate.register.registration import Registered, as_declared
 from validate.scene.geometries.specification import Box
 from validate.scene.laws import Coefficients
 from validate.scene.material import Material
@@ -103,6 +103,18 @@ def test_what_names_cannot_register_is_one_line() -> None:
     silent = replace(log(), signals={"stage": log().signals["stage"]})
     with pytest.raises(RegistrationError, match="nothing that this scene predicts"):
         as_declared(silent, scene)
+
+
+def test_an_input_without_a_value_is_named_by_its_path() -> None:
+    """A drive is no load."""
+    mesh = Box((0.1, 0.1, 0.1), (1, 1, 1)).resolved(Path())
+    for kind, part in (
+        ("drives", Drive("stage", "z1", (0.0, 0.0, 1.0))),
+        ("loads", Load("pull", "z1", (0.0, 0.0, 1.0))),
+    ):
+        scene = Scene(mesh, Material(1e4, 0.3), (Support("z0", (0, 1, 2)),), **{kind: (part,)})
+        with pytest.raises(RegistrationError, match=rf"set {kind}\.{part.name}\.value"):
+            Registered.given_inputs(scene, np.ones(1))
 
 
 def test_an_open_modulus_is_identified_and_not_evidence() -> None:

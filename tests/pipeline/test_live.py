@@ -493,6 +493,10 @@ def test_a_tip_recorded_at_different_times_is_refused() -> None:
     known = replace(signal(t), sd=2e-4)
     path = RecordedPath.of(replace(recording, signals={"tip.x": signal(t), "tip.y": known}), 2)
     assert (path.x.shape, path.sd) == ((3, 2), 2e-4)
+    with pytest.raises(RecordingError, match=r"has 2 coordinates, the body has 3; set it"):
+        RecordedPath.of(recording, 3, "set it")
+    with pytest.raises(RecordingError, match=r"no signal 'tip\.y'"):
+        RecordedPath.of(replace(recording, signals={"tip.x": known, "tip.z": known}), 2)
 
 
 def test_a_path_that_does_not_begin_at_rest_has_rest_a_tick_before() -> None:

@@ -206,6 +206,20 @@ def test_an_error_in_a_run_is_what_it_was(tmp_path: Path) -> None:
         assert "ZeroDivisionError: a trap" in err
 
 
+def test_a_mistake_of_the_experiments_own_code_is_named_below_its_traceback(tmp_path: Path) -> None:
+    """Also where a library below it raised; a bug of the package has no such line."""
+    path = pulled(tmp_path)
+    text = path.read_text("utf-8")
+    wrong = "load=lambda p, folder: np.zeros(2).reshape(3),"
+    kept = next(line for line in text.splitlines() if line.strip().startswith("load="))
+    path.write_text(text.replace(kept.strip(), wrong), "utf-8")
+    line = next(i for i, t in enumerate(path.read_text("utf-8").splitlines(), 1) if wrong in t)
+    code, _, err = here("run", str(path), "--out", str(tmp_path / "out"))
+    assert code == 70
+    assert "Traceback" in err
+    assert f"{path.name}, line {line}: raised by the experiment's own code" in err
+
+
 @pytest.mark.slow
 def test_an_external_simulator_is_run_anew_once_it_changed(tmp_path: Path) -> None:
     place = tmp_path / "own"

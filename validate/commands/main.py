@@ -94,10 +94,23 @@ class _OneLine(logging.Handler):
 
 
 def _bug() -> int:
-    """Keeps the traceback of what is being handled, and says so by the exit code."""
+    """Keeps the traceback of what is being handled, says whose code raised it where that is an
+    experiment's own, and gives the exit code."""
     import traceback
 
+    from validate.catalogue import shipped
+
     traceback.print_exc()
+    ours = (str(Path(__file__).parents[1]), str(shipped()))
+    frames = [
+        (frame.f_code.co_filename, line, frame.f_globals.get("__name__", ""))
+        for frame, line in traceback.walk_tb(sys.exc_info()[2])
+    ]
+    # What lies below, as numpy, was called by the last of these.
+    known = [f for f in frames if f[0].startswith(ours) or f[2].startswith("validate_experiment_")]
+    if known and not known[-1][0].startswith(ours):
+        file, line, _ = known[-1]
+        complain(f"{file}, line {line}: raised by the experiment's own code; correct this file")
     return BUG
 
 

@@ -134,7 +134,7 @@ class ForcePair:
         return TrackError(self.name, "force", error, float(np.ptp(self.y_reference)))
 
     def scores(self) -> tuple[Score, ...]:
-        """Scores `<name>.<metric>` of the self."""
+        """Return the scores `<name>.<metric>` of the force."""
         return tuple(metric.score(self, f"{self.name}.") for metric in FORCE_METRICS)
 
     @classmethod

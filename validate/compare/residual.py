@@ -75,7 +75,7 @@ class Residual:
 
     @classmethod
     def of(cls, registered: Registered, run: Run) -> tuple[Residual, ...]:
-        """Every observation at every selection, and the volume of every cavity there.
+        """Return every observation at every selection, and the volume of every cavity there.
 
         None for a run that did not reach the last input: it has no error over the whole.
         Raises `ComparisonError` when nothing matches in time.

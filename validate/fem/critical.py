@@ -70,7 +70,8 @@ class CriticalStep:
 
     @classmethod
     def of(cls, system: System, *, products: int = PRODUCTS, margin: float = MARGIN) -> Self:
-        """All limits of a system at rest, by its K and lumped masses, a viscoelastic one all taut.
+        """Return all limits of a system at rest, by its K and lumped masses, a viscoelastic one all
+        taut.
 
         Raises `SceneError` for a missing density or settings out of range.
         """
@@ -99,7 +100,8 @@ class CriticalStep:
     def by_lanczos(
         apply: MatVec, masses: Floats, *, products: int = PRODUCTS, margin: float = MARGIN
     ) -> LanczosStep:
-        """2/omega_max of M^-1 K from products K x alone, x (m,), with diagonal masses (m,) kg.
+        """Return 2/omega_max of M^-1 K from products K x alone, x (m,), with diagonal masses (m,)
+        kg.
 
         For a tangent at a deformed state as well. A negative tangent eigenvalue does not disturb
         it. Raises `SceneError` for fewer than 15 products or a margin outside 0..0.5.

@@ -127,25 +127,22 @@ class Registered:
 
     @staticmethod
     def given_inputs(scene: Scene, t: Floats) -> tuple[SignalObservation, ...]:
-        """One constant signal an input of the scene, at times t (nt,) s.
+        """Return one constant signal for every input of the scene, at times t (nt,) s.
 
         Raises `RegistrationError` for an input without a value.
         """
-        parts = (*scene.drives, *scene.loads)
-        if missing := [part.name for part in parts if part.value is None]:
-            raise RegistrationError(
-                f"input '{missing[0]}' has no value and no recording gives it; set "
-                f"loads.{missing[0]}.value"
-            )
-        return tuple(_constant(part, t) for part in parts)
+        inputs = {"drives": scene.drives, "loads": scene.loads}
+        for kind, parts in inputs.items():
+            for part in parts:
+                if part.value is None:
+                    raise RegistrationError(
+                        f"input '{part.name}' has no value and no recording gives it; set "
+                        f"{kind}.{part.name}.value"
+                    )
+        return tuple(_constant(part, t) for parts in inputs.values() for part in parts)
 
 
 # --- registration by names: streams drive the declared inputs of a scene or are compared ---------
-
-# --- A recording that is followed over time: one driving signal, and its markers as recorded.
-
-
-# -------------------------------------------------------------------------------------------------
 
 _UNITS: Mapping[type, str] = {
     Drive: "m", Load: "N", Weight: "m/s^2", Pressure: "Pa", RigidContact: "m"
@@ -153,8 +150,11 @@ _UNITS: Mapping[type, str] = {
 
 
 def as_declared(recording: Recording, scene: Scene, how: MarkerFit = MarkerFit()) -> Registered:
-    """Raise `RegistrationError` for an input that has no value and no signal, and where nothing of
-    the recording is predicted."""
+    """Return the recording registered by the names of the scene's inputs.
+
+    Raises `RegistrationError` for an input that has no value and no signal, and where nothing of
+    the recording is predicted.
+    """
     parts: tuple[Any, ...] = (*scene.drives, *scene.loads, *scene.movers)
     recorded = {
         part.name: SignalObservation.driving(

@@ -149,7 +149,10 @@ class Material:
     def mooney_rivlin(
         cls, C10: float, C01: float, nu: float, volumetric: VolumetricName = "split", **more: Any
     ) -> Self:
-        """C10, C01 Pa of I1 - 3 and I2 - 3 (Mooney 1940; Rivlin 1948): mu = 2 (C10 + C01)."""
+        """Make it of C10, C01 Pa of I1 - 3, I2 - 3 (Mooney 1940; Rivlin 1948): mu = 2 (C10 + C01).
+
+        `more`: other fields of a material, and `stretches` of its coefficients, here and below.
+        """
         return cls._rubber(
             "mooney_rivlin", 2 * (C10 + C01), nu, Coefficients(C01=C01), volumetric, more
         )
@@ -164,7 +167,7 @@ class Material:
         volumetric: VolumetricName = "split",
         **more: Any,
     ) -> Self:
-        """C10, C20, C30 Pa of the powers of I1 - 3 (Yeoh 1993): mu = 2 C10."""
+        """Make it of C10, C20, C30 Pa of the powers of I1 - 3 (Yeoh 1993): mu = 2 C10."""
         return cls._rubber("yeoh", 2 * C10, nu, Coefficients(C20=C20, C30=C30), volumetric, more)
 
     @classmethod
@@ -176,9 +179,9 @@ class Material:
         volumetric: VolumetricName = "split",
         **more: Any,
     ) -> Self:
-        """Terms mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), mu_p Pa (Ogden 1972): the
-        shear modulus is sum mu_p alpha_p / 2. Codes that write 2 mu_p/alpha_p^2 print mu_p
-        alpha_p / 2.
+        """Make it of terms mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3), mu_p Pa (Ogden
+        1972): the shear modulus is sum mu_p alpha_p / 2. Codes that write 2 mu_p/alpha_p^2 print
+        mu_p alpha_p / 2.
 
         Raises `SceneError` for another number of moduli than of powers.
         """
@@ -193,7 +196,6 @@ class Material:
         cls, law: LawName, shear: float, nu: float, known: Coefficients, form: VolumetricName,
         more: dict[str, Any],
     ) -> Self:  # fmt: skip
-        """`more`: other fields of `Material`, and `stretches` of its coefficients."""
         stretches = more.pop("stretches", known.stretches)
         coefficients = replace(known, volumetric=form, stretches=stretches)
         return cls(2 * shear * (1 + nu), nu, law, coefficients=coefficients, **more)

@@ -149,7 +149,7 @@ class Mesh:
         return int(np.argmin(np.linalg.norm(self.nodes - point, axis=1)))
 
     def cell_volumes(self) -> Floats:
-        """Signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by
+        """Return the signed volume (area in 2-D) of every cell (e,), from its vertices; bricks by
         quadrature."""
         x = self.nodes[self.corners]
         if self.bricks:

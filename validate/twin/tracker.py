@@ -149,7 +149,7 @@ class Origin:
         camera: Camera,
         readings: Mapping[str, Reading],
     ) -> Recording:
-        """Markers "markers" (points, then fiducials (3,) m) and a signal for every reading.
+        """Record markers "markers" (points, then fiducials (3,) m) and a signal for every reading.
 
         Rest at t = 0 is put in front of points that begin later (`march` gives the ends of steps);
         readings are zero there. Signals keep every step. Records: "marker_layout" (m, the scene's
@@ -273,7 +273,7 @@ class SteppedTwin:
         reading: Callable[[Run], Mapping[str, Reading]],
         progress: Callable[[str], None],
     ) -> Recording:
-        """Its probes and `fiducials` (d,) m as tracked, and what is read beside them.
+        """Record its probes and `fiducials` (d,) m as tracked, and what is read beside them.
 
         To what `origin` declares its modulus and Poisson ratio are added.
         """

@@ -268,7 +268,7 @@ class Boundaries:
         return {}
 
     def scores(self, name: str) -> tuple[Score, ...]:
-        """Scores `<name>.<metric>` of the two."""
+        """Return the scores `<name>.<metric>` of the two boundaries."""
         return tuple(metric.score(self, f"{name}.") for metric in BOUNDARY_METRICS)
 
 

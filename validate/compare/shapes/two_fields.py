@@ -10,8 +10,9 @@ from validate.arrays import Floats
 from validate.compare.score import Counted, Metric, Score
 from validate.compare.shapes.pair import Common, Field, FieldPair, count_outside, pair
 from validate.compare.shapes.shape_error import OF_BODIES, SHAPE_METRICS
-from validate.errors import ComparisonError
+from validate.errors import ComparisonError, UsageError
 from validate.fem.assembly.assemble import rule, values_at, volumes_at
+from validate.parameters import nearest_names
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Scene
 
@@ -262,10 +263,13 @@ class FieldScores:
 
         Norms and E_i are taken on the mesh `onto` (default: the reference's), boundaries on each
         field's own mesh. A scene as `onto` adds densities and the energy norms; earlier scores
-        stand for their mesh, which is then prepared once for all frames.
+        stand for their mesh, which is then prepared once for all frames. Raises `UsageError` for
+        an unknown metric.
         """
         common = onto.pair.common if isinstance(onto, FieldScores) else onto
         by_name = {m.name: m for m in METRICS_OF_FIELDS}
+        if unknown := [name for name in metrics or () if name not in by_name]:
+            raise UsageError(f"no metric '{unknown[0]}'; {nearest_names(unknown[0], set(by_name))}")
         chosen = None if metrics is None else tuple(by_name[name] for name in metrics)
         between = pair(one, other, common)
         found = compared(between, chosen)

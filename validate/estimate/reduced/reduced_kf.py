@@ -173,8 +173,6 @@ class CoreStepper(OneAtATime):
         return spread(self.system, free, np.zeros(0)).reshape(self.scene.mesh.nodes.shape)
 
 
-# --- few modes with an unknown load: the state-space model and its Kalman filter -----------------
-
 # --- linear state-space model of few modes with unknown load -------------------------------------
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from validate.arrays import Floats, Ints
-from validate.errors import RegistrationError
+from validate.arrays import Floats, Ints, checked
+from validate.errors import RegistrationError, SceneError
 from validate.scene.mesh import Mesh
 from validate.scene.scene import Probe
 from validate.scene.shape_functions import (
@@ -84,7 +84,12 @@ class Rows:
 
     @classmethod
     def barycentric(cls, mesh: Mesh, points: Floats) -> Self:
-        """Rows of the cell that holds each point (k, d), or of the nearest cell, clipped to it."""
+        """Return rows of the cell that holds each point (k, d) m, or of the nearest cell, clipped
+        to it.
+
+        Raises `SceneError` for points of another shape, or that are not finite.
+        """
+        points = checked(points, "points [m]", (None, mesh.dimension), error=SceneError)
         if mesh.bricks:
             cells = _near_cells(mesh, points)
             x = mesh.nodes[mesh.corners[cells]]
@@ -106,10 +111,10 @@ class Rows:
 
     @classmethod
     def standing(cls, mesh: Mesh, points: Floats) -> Self:
-        """Rows of points off the surface, as markers on stalks: each moves with its foot, the
-        nearest point of the surface (of bricks: of the nearest cell), and turns with the cell below
-        it, by the slope of the affine field (least squares) of its nodes. Points within the mesh
-        are read as `barycentric` does.
+        """Return rows of points off the surface, as markers on stalks: each moves with its foot,
+        the nearest point of the surface (of bricks: of the nearest cell), and turns with the cell
+        below it, by the slope of the affine field (least squares) of its nodes. Points within the
+        mesh are read as `barycentric` does.
         """
         rows = Rows.barycentric(mesh, points)
         off = rows.outside > _ROUNDING * float(np.ptp(mesh.nodes, axis=0).max())

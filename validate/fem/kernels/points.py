@@ -219,7 +219,7 @@ def along_svk(H: Nine, D: Nine, a: float, b: float) -> Nine:
 
 @inlined
 def along_neo_hooke(H: Nine, D: Nine, a: float, b: float) -> Nine:
-    """V dP: the tangent of `fem.laws.NeoHooke` times D, with X = F^-T."""
+    """V dP: the tangent of `fem.laws.law.NeoHooke` times D, with X = F^-T."""
     F, (dJ, K) = deformation(H), volume(H)
     y = inverse_cube_root(1 + dJ)
     m, third = b * y * y, 1 + (2 * (H[0] + H[4] + H[8]) + inner(H, H)) / 3

@@ -72,12 +72,6 @@ from validate.solve.dynamic.newmark import Newmark
 from validate.solve.explicit.linear import ExplicitLinear
 from validate.solve.static.quasi_static import QuasiStatic
 
-# --- What a method changes of a measured body's scene: its law, and the element of its cells.
-
-
-# -------------------------------------------------------------------------------------------------
-
-
 # --- The recorded motion as a report shows it: over time along where it is largest, its
 # spectrum, and its facts beside the body's first modes.
 

@@ -175,9 +175,3 @@ def _scaled(p: Parameter, factor: float) -> str:
 
 def _volume(mesh: Mesh) -> float:
     return float(np.abs(mesh.cell_volumes()).sum())
-
-
-# --- Height and diameter of equal area of a specimen's mesh file, between its plates.
-
-
-# -------------------------------------------------------------------------------------------------

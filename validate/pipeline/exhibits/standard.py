@@ -276,8 +276,6 @@ def _rate(f: MethodRun, settings: Any) -> float | None:
     return 1 / float(np.median(run.seconds[at]))
 
 
-# --- measurements that a filter's gate rejected: number, marker, time and distance ---------------
-
 # --- What filters found of the model itself: stiffness, supports and loads over time, and
 # whether the markers that they were given can tell them.
 

@@ -14,8 +14,6 @@ from validate.register.registration import Registered
 from validate.scene.scene import Scene
 from validate.solve.types import Stepper
 
-# Filters whose loads walk: the history of their defaults does not say what they were chosen on.
-
 
 @runtime_checkable
 class Limited(Protocol):

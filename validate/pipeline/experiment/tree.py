@@ -132,7 +132,7 @@ def beside(tree: Tree, folder: Path) -> tuple[Recording, ...]:
 
 
 def placed_by_names(recording: Recording, tree: Tree, scene: Scene) -> Registered:
-    """Return the recording by the names of the scene's inputs (`register.as_declared`)."""
+    """Return the recording by the names of the scene's inputs (see `as_declared`)."""
     return as_declared(recording, scene)
 
 

@@ -45,14 +45,15 @@ class RecordedPath:
             _require_dimension(recording, x.shape[1], dimension, hint)
             return cls(marker.t, np.array(x), marker.sd)
         names = [f"tip.{a}" for a in _AXES]
-        there = sum(name in recording.signals for name in names)
-        parts = [recording.signal(name, "m") for name in names[: max(there, dimension)] if there]
-        if not parts:
+        there = [name for name in names if name in recording.signals]
+        if not there:
             raise RecordingError(
                 f"{recording.name}: no signals tip.x, tip.y and no markers 'tip'; it has "
                 f"{sorted(recording.streams)}"
             )
-        _require_dimension(recording, len(parts), dimension, hint)
+        if there == names[: len(there)]:
+            _require_dimension(recording, len(there), dimension, hint)
+        parts = [recording.signal(name, "m") for name in names[:dimension]]
         if any(not np.array_equal(s.t, parts[0].t) for s in parts):
             raise RecordingError(
                 f"{recording.name}: tip.x .. tip.{_AXES[dimension - 1]} have "

@@ -307,7 +307,7 @@ class InclusionTest:
         recording: Recording, tree: Tree, scene: Scene, loads: tuple[float, ...],
         together: tuple[Together, ...], corners: tuple[Corner, ...] = (),
     ) -> Registered:  # fmt: skip
-        """Stage, outlines, markers and signals at rest and at `loads` m.
+        """Register stage, outlines, markers and signals, compared at rest and at `loads` m.
 
         Raises `ComparisonError` without loads, `RegistrationError` for a signal that falls as the
         plates close, and what the parts raise.
@@ -358,7 +358,7 @@ class InclusionTest:
 
     @staticmethod
     def rubbing(tree: Tree, share: float) -> Tree:
-        """Return the plates rub by a share, from 0 (they slip) to 1 (bonded)."""
+        """Return the parameters with plates that rub by a share, from 0 (slip) to 1 (bonded)."""
         contact, stiffness = plates_of_share(share, tree.scene.material.E, tree.scene.body.x)
         path = "foundations.plates."
         changed: Tree = with_given(tree, {f"{path}contact": contact, f"{path}stiffness": stiffness})

@@ -449,9 +449,3 @@ def _of_case(methods: Mapping[str, Method], case: Case) -> tuple[str, ...]:
     """The methods a case is run with: those it names, or all that are not only timed."""
     whole = [name for name, method in methods.items() if method.steps is None]
     return tuple(name for name in whole if not case.methods or name in case.methods)
-
-
-# --- Plug-ins that a run uses: those of which a class or a law is among its settings.
-
-
-# -------------------------------------------------------------------------------------------------

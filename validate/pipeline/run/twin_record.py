@@ -23,7 +23,7 @@ def stamped(recording: Recording, parameters: Any) -> Recording:
 
 def synthetic(recording: Recording) -> bool:
     """Return whether a recording says of itself that a model made it."""
-    return bool(recording.made_with) or _told(recording) == "twin"
+    return MADE_WITH in recording.metadata or _told(recording) == "twin"
 
 
 def computed(recording: Recording) -> bool:

@@ -166,14 +166,6 @@ def by_size(topic: str, images: tuple[Pixels, ...]) -> dict[str, Ints]:
     return {f"{topic}_{s}": np.flatnonzero(np.array(sizes) == s) for s in dict.fromkeys(sizes)}
 
 
-def _read(file: Path) -> Pixels:
-    data = read_bytes(file, MAX_FILE)
-    try:
-        return decode_png(data)
-    except RecordingError as error:
-        raise RecordingError(f"{file.name}: {error}; --as image-stack reads others") from None
-
-
 def _recognises(path: Path) -> bool:
     try:
         return path.is_dir() and bool(pictures(path)) and not pictures(path, OTHERS)

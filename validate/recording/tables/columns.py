@@ -338,8 +338,6 @@ def timed_pick(role: str, table: Table, said: Said | None) -> Pick:
     )
 
 
-# --- sign of compression in a force-displacement table, and columns to invert --------------------
-
 # --- Whether a test pulls or presses: by the user, the header, the columns, or the sign of
 # strain.
 

@@ -275,7 +275,7 @@ class MarkerObservation:
         tracker: str = "camera",
         up: tuple[float, float, float] = (0.0, 0.0, 1.0),
     ) -> Self:
-        """`of` by the recording's own records: "marker_layout" (m), and `tracker`, whose
+        """Register by the recording's own records: "marker_layout" (m), and `tracker`, whose
         "up" in the markers' frame is the scene's direction `up`.
 
         `up` is used for a layout that is a plane within the noise; any other shows a mirror itself.

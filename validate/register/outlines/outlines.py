@@ -358,7 +358,7 @@ class OutlineObservation:
         corners: tuple[Corner, ...] = (),
         sd_t: float = 0.0,
     ) -> Self:
-        """Outlines with their pose checked; raises `RegistrationError` for an improper pose."""
+        """Register outlines; raises `RegistrationError` for an improper pose."""
         require_rigid(contours.pose, "outline")
         return cls(
             name,

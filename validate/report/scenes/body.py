@@ -248,7 +248,7 @@ def _skin(mesh: Mesh, name: str, triangles: Ints, share: float) -> SurfacePart:
     corners = mesh.nodes[triangles]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = 0.5 * np.linalg.norm(cross, axis=1).sum()
-    size = float(np.sqrt(2 * area / len(triangles)))  # the legs of an average triangle
+    size = float(np.sqrt(2 * area / max(len(triangles), 1)))  # the legs of an average triangle
     used = np.unique(triangles)
     x, corner = mesh.nodes[used], np.searchsorted(used, triangles)
     kept = triangles

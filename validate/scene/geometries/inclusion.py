@@ -218,7 +218,7 @@ class Block:
         return np.array([self.size_x, self.size_y, self.size_z])
 
     def around(self, grid: tuple[int, int, int], shape: InclusionShape) -> Mesh:
-        """Linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
+        """Mesh linear tetrahedra around the inclusion; `grid` counts the nodes along x, y, z.
 
         Facet sets: the six sides as of `scene.geometries.box` and "cavity". Raises `SceneError`
         when the inclusion touches a face, is smaller than an element, or when the projection

@@ -361,7 +361,7 @@ class Cone:
 
 @dataclass(frozen=True)
 class MeshFile:
-    """A mesh file of `scene.mesh_files.mesh_file` or `scene.mesh_files.foreign_mesh`, from the
+    """A mesh file of `scene.mesh_files.mesh_file` or `.third_party_meshes`, from the
     experiment's folder."""
 
     file: str = quantity("", "1", "mesh file")

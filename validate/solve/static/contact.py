@@ -272,8 +272,6 @@ def updated(
     return new
 
 
-# --- static contact with rigid bodies by Newton's method, linear or at large strain --------------
-
 # --- What a contact tells at every step: force, friction, area, penetration, nodes, work.
 
 _EACH = {"force": "N", "friction": "N", "area": "m^2", "penetration": "m", "touching": "1",

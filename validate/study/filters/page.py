@@ -158,8 +158,6 @@ def _setting(path: str, row: _CellRow) -> str | None:
     return row.cell.values.get(path)
 
 
-# --- figures and tables: best settings, rankings, Pareto front, NIS maps -------------------------
-
 # --- Consistency and error over the swept axes of a filter study, as maps or curves.
 
 
@@ -572,6 +570,3 @@ def _pareto_chart(study: FilterStudy, ranking: Ranking, i: int) -> Chart:
         log="x" if signed else "xy",
         caption=f"A point is one cell: a method with one set of values.{none}",
     )  # fmt: skip
-
-
-# --- failures ------------------------------------------------------------------------------------

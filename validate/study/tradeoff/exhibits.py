@@ -191,9 +191,6 @@ def _shares(trade: Trade) -> Exhibit:
     return Exhibit("shares", "Mesh error and solver error", words, (least,), (meshes,))
 
 
-# --- set-up, steps, memory -----------------------------------------------------------------------
-
-
 # --- convergence ---------------------------------------------------------------------------------
 
 
