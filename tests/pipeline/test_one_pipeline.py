@@ -286,7 +286,8 @@ def test_a_check_that_compared_nothing_carries_the_unit_of_its_quantity() -> Non
     (check,) = compare(unknown, Options({})).checks
     assert (check.unit, check.why) == (
         "-",
-        "compared nothing: the recording does not have this quantity",
+        "compared nothing: the recording does not have this quantity; nearest: force, node_B, "
+        "node_A",
     )
 
 

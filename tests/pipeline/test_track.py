@@ -194,7 +194,9 @@ def test_a_marker_that_is_not_there_is_compared_with_nothing_and_fails() -> None
     one, two = result.checks
     assert one.verdict == "same model"
     assert one.count == STEPS
-    assert two.why == "compared nothing: the recording does not have this quantity"
+    assert two.why == (
+        "compared nothing: the recording does not have this quantity; nearest: node_B, node_A"
+    )
     assert two.verdict == "nothing compared"
     assert not result.passed
 

@@ -172,7 +172,7 @@ def check_passages(checks: Sequence[Json]) -> list[Passage]:
 def _row(check: Json, *, several: bool) -> list[str]:
     name = f"{check['method']}: {check['name']}" if several else check["name"]
     if not check["count"]:
-        return [name, "", "compared nothing"]
+        return [name, "", check["why"]]
     limit, u_val = check["limit"], check["u_val"]
     doubt = float("inf") if u_val is None else 2 * u_val
     if limit is not None:

@@ -25,6 +25,7 @@ from validate.compare.verdict import (
 from validate.errors import ComparisonError, SceneError
 from validate.fem.assembly.locate import probe_rows
 from validate.numbers import text, with_unit
+from validate.parameters import nearest_names
 from validate.pipeline.checks.consistency import claims_hold
 from validate.pipeline.experiment.experiment import (
     EffectSpec,
@@ -375,7 +376,9 @@ def _nothing(accept: Accept, mine: MethodRun, judged: Collection[str]) -> list[C
         why = ends or f"unknown load of {accept.quantity}; there are {', '.join(there)}"
         absent = [f"{accept.quantity}@{load}" for load in accept.loads if load not in there]
         return [_empty(accept, name, why, mine) for name in absent]
-    why = ends or "the recording does not have this quantity"
+    known = {r.quantity for r in mine.residuals.values()}
+    there_are = f"; {nearest_names(accept.quantity, known)}" if known else ""
+    why = ends or f"the recording does not have this quantity{there_are}"
     return [] if judged else [_empty(accept, accept.quantity, why, mine)]
 
 

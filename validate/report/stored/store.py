@@ -191,8 +191,8 @@ def overall_members(found: Overall) -> Json:
 
 
 def check_members(check: Check) -> Json:
-    """Return a check that compared nothing has no error and no uncertainty. `verdict` is the answer
-    that decides."""
+    """Return the members of a check; one that compared nothing has no error and no uncertainty.
+    `verdict` is the answer that decides."""
     parts = ("value", "raw", "noise", "u_val", "u_D", "u_num", "u_input")
     found = {k: v for k, v in members(check).items() if k != "ratio"}
     found |= {"verdict": check.verdict, "margin": check.margin}
