@@ -305,11 +305,11 @@ def plot(run: HasMethods, chart: Chart) -> dict[str, Any]:
             moving = np.flatnonzero(sense)
             turns = moving[1:][sense[moving[1:]] != sense[moving[:-1]]]
             ends = [0, *turns.tolist(), len(across) - 1]
-            parts = [np.arange(a, b + 1) for a, b in pairwise(ends)]
-            if len(parts) > _WAYS:
+            pieces = [np.arange(a, b + 1) for a, b in pairwise(ends)]
+            if len(pieces) > _WAYS:
                 style = "points"
-            elif len(parts) > 1:
-                ways = [part[np.argsort(across[part], kind="stable")] for part in parts]
+            elif len(pieces) > 1:
+                ways = [part[np.argsort(across[part], kind="stable")] for part in pieces]
         given = {"y": drawn.series.y}
         given |= {} if drawn.series.upper is None else {"upper": drawn.series.upper}
         for way in ways:

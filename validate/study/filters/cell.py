@@ -195,8 +195,8 @@ def _all_seeds(
         probes = dict(zip(names, batch.values[i, :, : len(names)].T, strict=True))
         u = batch.values[i, :, len(names) :].reshape(len(t), places, -1)
         y = batch.y[i]
-        tracks = _scoring(ready, fold)
-        held = () if tracks is None else tracks.errors(t, u, segments, ahead=False)
+        own = _scoring(ready, fold)
+        held = () if own is None else own.errors(t, u, segments, ahead=False)
         withheld = (*held, *ahead_errors(t, offered.names, y, measured[i], segments))
         scaled = np.where(measured[i], y / offered.sd, np.nan)
         innovations = innovations_of(t, scaled, batch.log_likelihood[i], batch.dof, segments)
