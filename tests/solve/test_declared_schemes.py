@@ -1,7 +1,7 @@
 """The one list of schemes: step maps and candidates come from their classes, a new one's too."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,7 +13,6 @@ from validate.engine.cell import Where
 from validate.fem.system import System
 from validate.pipeline.experiment.find import find, load_file
 from validate.pipeline.ladder.default import trial_of
-from validate.solve import schemes
 from validate.solve.dynamic.newmark import Newmark
 from validate.solve.handles import LINEAR_DYNAMICS, Handles
 from validate.solve.schemes import SCHEMES, steppings, steppings_for
@@ -125,11 +124,9 @@ def test_a_new_scheme_enters_by_its_name_in_the_list(toy: None) -> None:
 
 
 @pytest.mark.slow
-def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_a_new_scheme_is_chosen_where_it_meets_error_and_rate(toy: None, tmp_path: Path) -> None:
     """`study choose` runs its candidates: as the only scheme in the list it is the choice."""
-    monkeypatch.setattr(schemes, "SCHEMES", replace(SCHEMES, own=(Toy,)))
+    object.__setattr__(SCHEMES, "own", (Toy,))
     pulled, here = load_file(experiment_file(tmp_path)), Where(workers=0)
     climb = Climb(pulled, quick=True, out=tmp_path, where=here)
     found = choose(
