@@ -122,6 +122,14 @@ def test_likely_causes_stand_on_the_screen(capsys: pytest.CaptureFixture[str]) -
     assert "  1. modulus or density  62 %  weigh the body\n" in capsys.readouterr().out
 
 
+def test_a_check_that_compared_nothing_has_its_reason(capsys: pytest.CaptureFixture[str]) -> None:
+    soft, stiff = small_result().methods
+    none = replace(CHECK, count=0, acceptance="nothing compared", why="compared nothing: at all")
+    methods = (replace(soft, checks=(none,)), stiff)
+    show_run(replace(small_result(), methods=methods), "cube", PAGE, 1.0)
+    assert "compared nothing: at all\n" in capsys.readouterr().out
+
+
 def test_quiet_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     show([Passage("", ("one: good", "  enough")), Passage("more", ("x",))], "short")
     assert capsys.readouterr().out == "one: good enough\n"
